@@ -12,6 +12,7 @@
 #include "common/bus/topics.h"
 #include "common/service/on_demand.h"
 #include "common/wire/cdr.h"
+#include "services/gateway/mcp/worker.h"
 #include "services/gateway/node.h"
 #include "services/gateway/web/server.h"
 
@@ -30,6 +31,7 @@ struct Mail {
   std::vector<gateway::Channels> wanted;  ///< all changes, not only the last, because a client that
                                           ///< reconnects must receive the current state again
   std::vector<gateway::Call> calls;
+  std::vector<gateway::mcp::Question> questions;
 };
 
 std::vector<gateway::Figure> figuresOf(const web::Stats& stats,
@@ -258,6 +260,11 @@ void serve(service::Context& context, const gateway::Config& config, const std::
   Mail mail;
   web::Content content = contentFor(context, config);
   const bool has_page = !content.files.empty();
+  content.ask = [&](std::uint64_t number, std::string message) {
+    const std::lock_guard lock(mail.mutex);
+    mail.questions.push_back({number, std::move(message)});
+    context.loop().wake();
+  };
   web::Server server(config.web, std::move(content),
                      {.wanted =
                           [&](const gateway::Channels& wanted) {
@@ -271,6 +278,10 @@ void serve(service::Context& context, const gateway::Config& config, const std::
                             mail.calls.push_back(std::move(call));
                             context.loop().wake();
                           }});
+  gateway::mcp::Worker worker(context.participant(),
+                              [&](std::uint64_t number, const gateway::mcp::Answer& answer) {
+                                server.reply(number, answer.status, answer.text);
+                              });
   auto& questions = context.writer(bus::kTopic<MapQuery>);
   gateway::Node node(config, vehicle, context.instance(),
                      {.message = [&](const gateway::Encoded& message) { server.publish(message); },
@@ -283,11 +294,14 @@ void serve(service::Context& context, const gateway::Config& config, const std::
   context.loop().onWake([&] {
     std::vector<gateway::Channels> changes;
     std::vector<gateway::Call> calls;
+    std::vector<gateway::mcp::Question> asked;
     {
       const std::lock_guard lock(mail.mutex);
       changes.swap(mail.wanted);
       calls.swap(mail.calls);
+      asked.swap(mail.questions);
     }
+    for (gateway::mcp::Question& question : asked) worker.put(std::move(question));
     for (const gateway::Channels& wanted : changes) {
       beginning.setWanted(wanted, monotonicNs());
       readers.follow(wanted);

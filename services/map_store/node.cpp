@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "common/mapping/frames/sight.h"
+
 namespace perdure::map_store {
 namespace {
 
@@ -184,6 +186,12 @@ void Node::flush() {
   publish();
 }
 
+/// Returns what the cameras see, if that is not stored yet; else an empty text.
+std::string Node::camerasText() const {
+  if (!cameras_) return {};
+  return mapping::toText(mapping::sightsOf(*cameras_, newest_->T_WB, newest_->up_W));
+}
+
 void Node::commit() {
   if (!newest_) {  // ended tracks need a working set first
     dirty_ = false;
@@ -193,9 +201,10 @@ void Node::commit() {
   const NewEarth earth = newEarthAnchor();
   std::set<TrackId> placed;
   for (const auto& [track, given] : placed_) placed.insert(track);
-  const auto written = database_.write({&*newest_, left_, removed_, std::move(placed),
-                                        graph_ ? &unsaved : nullptr, &mapper_.identity(), &unsaved,
-                                        mapper_.regrouped(), acknowledged_, earth.text});
+  const auto written =
+      database_.write({&*newest_, left_, removed_, std::move(placed), graph_ ? &unsaved : nullptr,
+                       &mapper_.identity(), &unsaved, mapper_.regrouped(), acknowledged_,
+                       earth.text, camerasText()});
   if (!written) {
     blame(written.error());
     return;  // dirty_ is still true, so the next tick tries again
@@ -203,6 +212,7 @@ void Node::commit() {
   mapper_.markSaved();
   if (written->unsound > 0) reasons_.add("graph_unsound", written->unsound);
   if (!earth.text.empty()) told_earth_ = earth.of;
+  cameras_.reset();
   failure_.clear();
   dirty_ = false;
   acknowledged_ = 0;

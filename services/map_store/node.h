@@ -52,8 +52,12 @@ class Node {
 
   void onObjects(const Objects& objects);
   void onOdometry(const Odometry& odometry);
-  /// The map stores the position on Earth that follows from the calibration's anchor.
-  void onCalibration(const Calibration& calibration) { earth_.onCalibration(calibration); }
+  /// The map stores what the cameras see, and the position on Earth that follows from the
+  /// calibration's anchor.
+  void onCalibration(const Calibration& calibration) {
+    earth_.onCalibration(calibration);
+    cameras_ = calibration;
+  }
   void onLandmarks(const Landmarks& landmarks);
   void onQuery(const MapQuery& query);
   /// Commits and publishes changes that are due. `now` is a monotonic time with any origin. Call it
@@ -89,6 +93,7 @@ class Node {
   void takeEnded(const std::vector<EndedTrack>& ended);
   void leaveBehind(const Objects& next);
   bool acceptable(const ObjectBelief& belief);
+  std::string camerasText() const;
   void commit();
   MapReply answer(const MapQuery& query);
   MapReply emptyReply(const MapQuery& query) const;
@@ -118,6 +123,7 @@ class Node {
   MapDatabase database_;
   mapping::Mapper mapper_;
   EarthPlace earth_;
+  std::optional<Calibration> cameras_;  ///< a calibration that is not stored yet
   bool earth_stored_ = false;  ///< an earlier process stored the position; it is not overwritten
   std::optional<std::pair<std::uint64_t, TimePoint>>
       told_earth_;      ///< revision of the graph and earth_.known() at the last write

@@ -29,7 +29,7 @@ const std::vector<Layers> kLayers{
      {"belief", "measurement", "visibility", "association", "update", "smoothing", "tracks",
       "memory", "planning", ""}},
     {"services/vio/core/", {"state", "propagation", "tracks", "update", "", "start"}},
-    {"services/gateway/", {"core", "protocol", "web", ""}},
+    {"services/gateway/", {"core", "protocol", "mcp", "web", ""}},
     {"services/inference/core/", {"", "network", "decode", "takeover"}},
     {"services/map_store/", {"core", "fleet", ""}},
     {"services/ros2/", {"core", ""}},

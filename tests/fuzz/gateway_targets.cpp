@@ -3,12 +3,14 @@
 #include <set>
 
 #include "common/wire/cdr.h"
+#include "services/gateway/mcp/protocol.h"
 #include "services/gateway/node.h"
 #include "services/gateway/protocol/client_message.h"
 #include "services/gateway/web/guard.h"
 #include "services/gateway/web/hub.h"
 #include "tests/common/wire/examples.h"
 #include "tests/fuzz/target.h"
+#include "tests/services/gateway/mcp/town.h"
 
 namespace perdure::fuzz {
 namespace {
@@ -169,6 +171,35 @@ std::vector<Bytes> graphReplySeeds() {
   return seeds;
 }
 
+/// A message of an MCP client about a map in memory.
+bool takeMcpMessage(View bytes) {
+  static test::Town town;
+  const mcp::Answer answer = mcp::answer(textOf(bytes), town);
+  require(answer.text.empty() == (answer.status == 202), "each request is answered");
+  require(answer.text.find('\n') == std::string::npos, "an answer is one line");
+  if (answer.text.empty()) return true;
+  const auto json = nlohmann::json::parse(answer.text, nullptr, false);
+  require(!json.is_discarded(), "an answer is JSON");
+  return json.contains("result") && !json["result"].value("isError", false);
+}
+
+std::vector<Bytes> mcpSeeds() {
+  std::vector<Bytes> seeds{bytesOf(R"({"jsonrpc":"2.0","method":"notifications/initialized"})"),
+                           bytesOf(R"({"jsonrpc":"2.0","id":1,"method":"initialize","params":)"
+                                   R"({"protocolVersion":"2025-06-18"}})"),
+                           bytesOf(R"({"jsonrpc":"2.0","id":"a","method":"tools/list"})")};
+  for (const char* call :
+       {R"("find_objects","arguments":{"text":"red cars","near":[10,5.5],"radius_m":20,"limit":3})",
+        R"("where_last_seen","arguments":{"id":5})", R"("why","arguments":{"id":1})",
+        R"("what_changed","arguments":{"since_s":-3.5,"class":"car"})",
+        R"("never_seen","arguments":{"near":[-30,0],"radius_m":5})"}) {
+    seeds.push_back(bytesOf(std::string(R"({"jsonrpc":"2.0","id":2,"method":"tools/call",)"
+                                        R"("params":{"name":)") +
+                            call + "}}"));
+  }
+  return seeds;
+}
+
 /// A Host and an Origin header, in two lines. Only names of this machine are accepted.
 bool takeHeaders(View bytes) {
   const std::string text = textOf(bytes);
@@ -193,6 +224,7 @@ std::vector<Target> gatewayTargets() {
   return {{"gateway_said", 9000, saidSeeds, takeSaid},
           {"gateway_question", 6000, questionSeeds, takeQuestion},
           {"gateway_graph", 4200, graphReplySeeds, takeGraphReply},
+          {"gateway_mcp", 3000, mcpSeeds, takeMcpMessage},
           {"gateway_headers", 18000, headerSeeds, takeHeaders}};
 }
 

@@ -8,11 +8,11 @@
 #include <optional>
 #include <utility>
 
+#include "common/bus/map_client.h"
 #include "common/bus/topics.h"
 #include "common/bus/wait_loop.h"
 #include "tests/process/support.h"
 #include "tests/services/map_store/beliefs.h"
-#include "tools/map/map_source.h"
 
 namespace perdure::test {
 namespace {
@@ -45,7 +45,7 @@ class MapStoreProcess : public ::testing::Test {
   }
 
   std::size_t objectsOnTheMap() {
-    const auto reply = tools::askMapStore(participant_, MapQuery{}, 10.0);
+    const auto reply = bus::MapClient(participant_).ask({}, 10.0);
     return reply ? reply->objects.size() : SIZE_MAX;
   }
 
@@ -139,7 +139,7 @@ TEST_F(MapStoreProcess, AnswersWithItsGraph) {
   query.kind = MapQueryKind::kGraph;
   Result<MapReply> reply = fail("not_asked");
   ASSERT_TRUE(eventually(10s, [&] {
-    reply = tools::askMapStore(participant_, query, 5.0);
+    reply = bus::MapClient(participant_).ask(query, 5.0);
     return reply && reply->anchors.size() >= 4;
   })) << child->log();
   EXPECT_TRUE(reply->ok);

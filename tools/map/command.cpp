@@ -9,6 +9,8 @@
 
 #include "common/base/checked_file.h"
 #include "common/base/errors.h"
+#include "common/bus/map_client.h"
+#include "common/types/ledger_json.h"
 #include "services/map_store/core/graph/graph_answer.h"
 #include "services/map_store/fleet/map_transfer.h"
 #include "tools/bus_tools/common.h"
@@ -18,7 +20,6 @@
 #include "tools/map/map_source.h"
 #include "tools/map/render.h"
 #include "tools/map/why.h"
-#include "tools/outputs/ledger_json.h"
 #include "tools/perdure/commands.h"
 
 namespace perdure::tools {
@@ -38,7 +39,7 @@ struct Request {
 MapReply askOverDds(const Request& request) {
   const bus::Domain domain(request.bus);
   const bus::Participant participant(domain, "perdure map");
-  const auto reply = askMapStore(participant, request.query, request.patience_s);
+  const auto reply = bus::MapClient(participant).ask(request.query, request.patience_s);
   if (reply) return *reply;
   const bus::Options& bus = domain.options();
   throw StartupError(
@@ -50,8 +51,8 @@ MapReply askOverDds(const Request& request) {
 }
 
 MapReply askFile(const Request& request) {
-  return askMapFile(request.db, request.query,
-                    request.frame == "W" ? MapFrameChoice::kW : MapFrameChoice::kM);
+  return MapFile(request.db)
+      .ask(request.query, request.frame == "W" ? MapFrameChoice::kW : MapFrameChoice::kM);
 }
 
 MapReply ask(const Request& request) {
@@ -108,7 +109,7 @@ void why(const Request& request) {
   }
   const ObjectBelief& belief = reply.beliefs.front();
   std::optional<Standing> standing;  // not available from a running map_store
-  if (!request.db.empty()) standing = askStanding(request.db, belief.id);
+  if (!request.db.empty()) standing = MapFile(request.db).standing(belief.id);
   if (request.json) {
     auto json = toJson(belief.why);
     if (standing) json["map"] = toJson(*standing);
@@ -141,7 +142,7 @@ void chooseKind(Request& request) {
 std::optional<GeoAnchor> anchorOf(const Request& request) {
   if (request.anchor.empty()) {
     const bool known = !request.db.empty() && request.frame == "M";
-    return known ? earthAnchorOfMapFile(request.db) : std::nullopt;
+    return known ? MapFile(request.db).earthAnchor() : std::nullopt;
   }
   const auto& a = request.anchor;
   return GeoAnchor{{}, a[0], a[1], a[2], a[3] * std::numbers::pi / 180.0};
@@ -153,7 +154,7 @@ void showGraph(const Request& request) {
     graph = askOverDds(request);
     if (!graph.ok) throw StartupError(ExitCode::kUsage, graph.error);
   } else {
-    graph = askGraphOfFile(request.db, request.query);
+    graph = MapFile(request.db).graph(request.query);
   }
   std::cout << (request.json ? toGraphJson(graph).dump(1) + "\n" : toGraphText(graph));
 }

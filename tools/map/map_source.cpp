@@ -1,20 +1,14 @@
 #include "tools/map/map_source.h"
 
-#include <chrono>
 #include <numbers>
-#include <optional>
 #include <sstream>
+#include <utility>
 
-#include "common/bus/topics.h"
-#include "common/bus/wait_loop.h"
+#include "common/mapping/frames/laid_belief.h"
 #include "services/map_store/core/graph/graph_answer.h"
-#include "services/map_store/core/map_places.h"
 
 namespace perdure::tools {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-using namespace std::chrono_literals;
 
 template <class T>
 T read(const std::string& path, Result<T> result) {
@@ -30,65 +24,38 @@ map_store::Connection openAtOneState(const std::string& path) {
   return connection;
 }
 
-WorldId newestWorld(const map_store::MapReader& reader) {
-  const auto working = reader.working();
-  return working && *working ? (*working)->world : WorldId{};
-}
-
-Result<map_store::Found> findInM(const map_store::MapReader& reader, const MapQuery& query,
-                                 const WorldId& newest) {
-  const auto graph = reader.graph();
-  if (!graph) return tl::unexpected<Reason>(graph.error());
-  const auto& records = graph->map.records;
-  constexpr double kTile_m = 32.0;  // any value, because no tiles are requested
-  map_store::MapInM map(reader, kTile_m, [&records](ObjectId id) {
-    const auto at = records.find(id);
-    return at == records.end() ? nullptr : &at->second;
-  });
-  const auto done = map.load(mapping::MapFrames(mapping::MapState({}, graph->map)));
-  if (!done) return tl::unexpected<Reason>(done.error());
-  return map.find(query, newest, query.limit);
-}
-
 }  // namespace
 
-Result<MapReply> askMapStore(const bus::Participant& participant, MapQuery query,
-                             double patience_s) {
-  constexpr auto kResend = 500ms;
-  bus::Writer<MapQuery> questions(participant, bus::kTopic<MapQuery>);
-  bus::Reader<MapReply> answers(participant, bus::kTopic<MapReply>);
-  query.client = makeInstanceId();
-  query.request = 1;
+MapFile::MapFile(std::string path)
+    : path_(std::move(path)),
+      connection_(openAtOneState(path_)),
+      working_(reader_.working().value_or(std::nullopt)) {}
 
-  std::optional<MapReply> reply;
-  bus::WaitLoop loop(participant);
-  loop.on(answers, [&](const MapReply& r) {
-    if (r.client == query.client && r.request == query.request) reply = r;
-  });
-  const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(
-                                      std::chrono::duration<double>(patience_s));
-  Clock::time_point next_send{};
-  bool matched = false;
-  while (!reply) {
-    const auto now = Clock::now();
-    if (now >= end) return fail(matched ? "no_answer" : "no_map_store");
-    matched = questions.matched() > 0 && answers.matched() > 0;
-    if (matched && now >= next_send) {
-      (void)questions.write(query);
-      next_send = now + kResend;
-    }
-    loop.runOnce(20ms);
-  }
-  return *reply;
+const mapping::SavedMap& MapFile::saved() const {
+  if (!saved_) saved_ = read(path_, reader_.graph()).map;
+  return *saved_;
 }
 
-MapReply askMapFile(const std::string& path, const MapQuery& query, MapFrameChoice frame) {
-  const auto connection = openAtOneState(path);
-  const map_store::MapReader reader(&connection);
-  const WorldId newest = newestWorld(reader);
+mapping::MapFrames MapFile::frames() const {
+  return mapping::MapFrames(mapping::MapState({}, saved()));
+}
+
+const map_store::MapInM& MapFile::inM() {
+  if (view_) return *view_;
+  constexpr double kTile_m = 32.0;  // any value, because no tiles are requested
+  view_.emplace(reader_, kTile_m, [this](ObjectId id) {
+    const auto at = saved().records.find(id);
+    return at == saved().records.end() ? nullptr : &at->second;
+  });
+  read(path_, view_->load(frames()));
+  return *view_;
+}
+
+MapReply MapFile::ask(const MapQuery& query, MapFrameChoice frame) {
+  const WorldId newest = working_.value_or(Objects{}).world;
   const bool as_stored = frame == MapFrameChoice::kW || query.world.world != 0;
-  auto found = read(
-      path, as_stored ? reader.find(query, newest, query.limit) : findInM(reader, query, newest));
+  auto found = read(path_, as_stored ? reader_.find(query, newest, query.limit)
+                                     : inM().find(query, newest, query.limit));
   MapReply reply;
   reply.truncated = found.truncated;
   reply.objects = std::move(found.objects);
@@ -96,43 +63,54 @@ MapReply askMapFile(const std::string& path, const MapQuery& query, MapFrameChoi
   return reply;
 }
 
-MapReply askGraphOfFile(const std::string& path, const MapQuery& query) {
-  const auto connection = openAtOneState(path);
-  const map_store::MapReader reader(&connection);
-  mapping::Mapper mapper({}, read(path, reader.graph()).map);
+MapReply MapFile::graph(const MapQuery& query) const {
+  mapping::Mapper mapper({}, saved());
   MapReply reply;
-  map_store::putGraph(mapper, {}, newestWorld(reader), query, reply);
+  map_store::putGraph(mapper, {}, working_.value_or(Objects{}).world, query, reply);
   return reply;
 }
 
-std::optional<GeoAnchor> earthAnchorOfMapFile(const std::string& path) {
-  const auto connection = openAtOneState(path);
-  const map_store::MapReader reader(&connection);
-  std::istringstream numbers(read(path, reader.earthAnchor()));
+std::optional<GeoAnchor> MapFile::earthAnchor() const {
+  std::istringstream numbers(read(path_, reader_.earthAnchor()));
   GeoAnchor anchor;
   double yaw_deg = 0.0;
   if (!(numbers >> anchor.latitude_deg >> anchor.longitude_deg >> anchor.height_m >> yaw_deg)) {
     return std::nullopt;
   }
   anchor.yaw = yaw_deg * std::numbers::pi / 180.0;
-  const WorldId newest = newestWorld(reader);
-  const mapping::MapFrames frames(mapping::MapState({}, read(path, reader.graph()).map));
+  const WorldId newest = working_.value_or(Objects{}).world;
+  const mapping::MapFrames frames = this->frames();
   const auto last = frames.anchorOf(nullptr, newest, TimePoint::max());
   return frames.at(last, newest).provisional ? std::nullopt : std::optional(anchor);
 }
 
-Standing askStanding(const std::string& path, ObjectId id) {
-  const auto connection = openAtOneState(path);
-  const map_store::MapReader reader(&connection);
+Standing MapFile::standing(ObjectId id) const {
   MapQuery query;
   query.kind = MapQueryKind::kById;
   query.object_id = id;
-  const auto found = read(path, reader.find(query, {}, 1));
+  const auto found = read(path_, reader_.find(query, {}, 1));
   if (found.beliefs.empty()) {
-    map_store::cannotReadMap(path, {"no_object", "it no longer has the object"});
+    map_store::cannotReadMap(path_, {"no_object", "it no longer has the object"});
   }
-  return standingOf(found.beliefs.front(), found.objects.front().world,
-                    read(path, reader.graph()).map, read(path, reader.mergedInto(id)));
+  return standingOf(found.beliefs.front(), found.objects.front().world, saved(),
+                    read(path_, reader_.mergedInto(id)));
 }
+
+std::vector<map_store::EndedObject> MapFile::ended() {
+  auto ended = read(path_, reader_.ended());
+  const mapping::MapFrames frames = this->frames();
+  for (map_store::EndedObject& each : ended) {
+    map_store::PlacedBelief& placed = each.last;
+    const auto anchor = frames.anchorOf(nullptr, placed.world, placed.belief.last_seen);
+    placed.belief = mapping::turned(frames.at(anchor, placed.world).T_MW, std::move(placed.belief));
+  }
+  return ended;
+}
+
+std::vector<mapping::Sight> MapFile::cameras() const {
+  return mapping::sightsFrom(read(path_, reader_.cameras()));
+}
+
+TimePoint MapFile::time() const { return working_ ? working_->stamp.time : TimePoint(); }
 
 }  // namespace perdure::tools

@@ -1,38 +1,58 @@
-// Sends map queries to the running map_store over DDS, or to its file.
+// Answers queries from a map's file.
 #pragma once
 
 #include <optional>
 #include <string>
+#include <vector>
 
-#include "common/base/result.h"
-#include "common/bus/domain.h"
+#include "common/mapping/frames/sight.h"
 #include "common/types/map.h"
 #include "common/types/sensors.h"
 #include "services/map_store/core/map_database.h"
+#include "services/map_store/core/map_places.h"
 #include "tools/map/standing.h"
 
 namespace perdure::tools {
 
-/// Queries map_store over the bus. Waits until reader and writer are matched, because DDS silently
-/// drops earlier requests. Then repeats the request until a reply arrives. After `patience_s`,
-/// fails with "no_map_store" if nothing matched, else with "no_answer".
-Result<MapReply> askMapStore(const bus::Participant& participant, MapQuery query,
-                             double patience_s);
-
 /// The frame of objects from a map's file: M, or W as stored.
 enum class MapFrameChoice { kM, kW };
 
-/// Answers a query from a map's file, which a service may use at the same time. Spatial queries
-/// search query.world; if it is 0, they search the M or W of the newest session. If it is not 0,
-/// objects are in W. Throws StartupError.
-MapReply askMapFile(const std::string& path, const MapQuery& query,
-                    MapFrameChoice frame = MapFrameChoice::kM);
-/// Returns the graph of a map's file as a running map_store would. Throws StartupError.
-MapReply askGraphOfFile(const std::string& path, const MapQuery& query);
-/// Returns the position of M's origin on Earth, and the yaw of M. Returns nothing if the file has
-/// none, or if the newest session is not joined to the map. Throws StartupError.
-std::optional<GeoAnchor> earthAnchorOfMapFile(const std::string& path);
-/// Returns the standing of an object in a map's file. Throws StartupError if it is absent.
-Standing askStanding(const std::string& path, ObjectId id);
+/// One state of a map's file, which a service may write at the same time. All functions throw
+/// StartupError.
+class MapFile {
+ public:
+  explicit MapFile(std::string path);
+  MapFile(const MapFile&) = delete;
+  MapFile& operator=(const MapFile&) = delete;
+
+  /// Answers a query. Spatial queries search query.world; if it is 0, they search the M or W of the
+  /// newest session. If it is not 0, objects are in W.
+  MapReply ask(const MapQuery& query, MapFrameChoice frame = MapFrameChoice::kM);
+  /// Returns the graph as a running map_store would.
+  MapReply graph(const MapQuery& query) const;
+  /// Returns the position of M's origin on Earth, and the yaw of M. Returns nothing if the file has
+  /// none, or if the newest session is not joined to the map.
+  std::optional<GeoAnchor> earthAnchor() const;
+  /// Returns the standing of an object, which must exist.
+  Standing standing(ObjectId id) const;
+  /// Returns the objects that are history, with their last beliefs in M.
+  std::vector<map_store::EndedObject> ended();
+  /// Returns the fields of view of the last cameras; empty if they are not known.
+  std::vector<mapping::Sight> cameras() const;
+  /// Returns the time of the last stored frame.
+  TimePoint time() const;
+
+ private:
+  const mapping::SavedMap& saved() const;
+  mapping::MapFrames frames() const;
+  const map_store::MapInM& inM();
+
+  std::string path_;
+  map_store::Connection connection_;
+  map_store::MapReader reader_{&connection_};
+  std::optional<Objects> working_;                  ///< the last stored working set
+  mutable std::optional<mapping::SavedMap> saved_;  ///< the graph, once it was needed
+  std::optional<map_store::MapInM> view_;
+};
 
 }  // namespace perdure::tools

@@ -11,7 +11,7 @@
 #include "common/earth/geodesy.h"
 #include "common/mapping/frames/laid_belief.h"
 #include "common/math/so3.h"
-#include "tools/outputs/ledger_json.h"
+#include "common/types/ledger_json.h"
 #include "tools/outputs/pictures/evolution_picture.h"
 #include "tools/outputs/pictures/map_picture.h"
 

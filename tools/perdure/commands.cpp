@@ -12,6 +12,7 @@ constexpr CommandEntry kCommands[] = {
     {"simulate", "Render a camera and IMU sequence with exact truth, in EuRoC's folder layout"},
     {"calibrate", "Lens, place and time offset of a camera on an IMU, from a recording of a board"},
     {"map", "What the map holds: over DDS, or from its file"},
+    {"mcp", "Answer questions about a map by the Model Context Protocol, on standard input"},
     {"demo", "The five services under supervision over a drive; deploy/demo builds and calls it"},
     {"record", "record topics into MCAP files"},
     {"play", "play a recording onto the bus"},

@@ -30,6 +30,7 @@ void setUpEvaluate(CLI::App& command);
 void setUpHz(CLI::App& command);
 void setUpInference(CLI::App& command);
 void setUpMap(CLI::App& command);
+void setUpMcp(CLI::App& command);
 void setUpModel(CLI::App& command);
 void setUpPipeline(CLI::App& command);
 void setUpPlay(CLI::App& command);

@@ -17,8 +17,8 @@ py::object ask(const std::string& path, py::handle query, bool as_stored) {
   MapReply reply;
   {
     const py::gil_scoped_release reads;
-    reply = tools::askMapFile(path, question,
-                              as_stored ? tools::MapFrameChoice::kW : tools::MapFrameChoice::kM);
+    reply = tools::MapFile(path).ask(
+        question, as_stored ? tools::MapFrameChoice::kW : tools::MapFrameChoice::kM);
   }
   return python::toPython(reply);
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -10,6 +11,9 @@
 #include "common/base/result.h"
 
 namespace perdure::gateway::web {
+
+/// Takes a message of an MCP client, with its number.
+using Ask = std::function<void(std::uint64_t question, std::string message)>;
 
 struct Options {
   std::string address = "127.0.0.1";

@@ -2,6 +2,7 @@
 // HTTP session.
 #include <optional>
 
+#include "services/gateway/mcp/protocol.h"
 #include "services/gateway/protocol/server_message.h"
 #include "services/gateway/web/shared.h"
 
@@ -30,7 +31,8 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   void read() {
     parser_.emplace();
     parser_->header_limit(kLongestHeader);
-    parser_->body_limit(0);
+    constexpr std::uint64_t kKilobyte = 1024;
+    parser_->body_limit(kKilobyte * static_cast<std::uint64_t>(shared_->options.most_message_kb));
     stream_.expires_after(kPatience);
     http::async_read(
         stream_, buffer_, *parser_,
@@ -45,6 +47,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   void onRead(beast::error_code error);
   void upgrade();
   void answer();
+  void answerQuestion();
   void answerFile(std::string_view path);
   void refuse(http::status status, const Reason& reason);
   void say(http::status status, const char* type, std::string text);
@@ -53,7 +56,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
 
   beast::tcp_stream stream_;
   beast::flat_buffer buffer_{kLongestHeader};
-  std::optional<http::request_parser<http::empty_body>> parser_;
+  std::optional<http::request_parser<http::string_body>> parser_;
   std::shared_ptr<Shared> shared_;
   int served_ = 0;
 };
@@ -111,8 +114,34 @@ void HttpSession::upgrade() {
   serveClient(std::move(stream_), parser_->release(), std::string(protocol), shared_);
 }
 
+/// Answers a message of an MCP client (Streamable HTTP without streams and sessions).
+void HttpSession::answerQuestion() {
+  Request& request = parser_->get();
+  if (request.method() != http::verb::post) {
+    return refuse(http::status::method_not_allowed,
+                  {"method_refused", "only POST: there is no stream, and there are no sessions"});
+  }
+  const auto origin = shared_->guard.checkOrigin(view(request[http::field::origin]),
+                                                 view(request[http::field::host]));
+  if (!origin) return refuse(http::status::forbidden, origin.error());
+  const auto token =
+      shared_->guard.checkToken(view(request.target()), view(request[http::field::authorization]));
+  if (!token) return refuse(http::status::unauthorized, token.error());
+  const auto revision = view(request["MCP-Protocol-Version"]);
+  if (!revision.empty() && !mcp::isKnownRevision(revision)) {
+    return refuse(http::status::bad_request,
+                  {"mcp_revision_unknown", "MCP-Protocol-Version is none of this server's"});
+  }
+  const std::uint64_t number = ++shared_->questions;
+  shared_->replies[number] = [self = shared_from_this()](int status, std::string text) {
+    self->say(static_cast<http::status>(status), "application/json", std::move(text));
+  };
+  shared_->ask(number, std::move(request.body()));
+}
+
 void HttpSession::answer() {
   const Request& request = parser_->get();
+  if (shared_->ask && pathOf(view(request.target())) == "/mcp") return answerQuestion();
   if (request.method() != http::verb::get && request.method() != http::verb::head) {
     return refuse(http::status::method_not_allowed, {"method_refused", "only GET and HEAD"});
   }

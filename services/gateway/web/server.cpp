@@ -41,7 +41,10 @@ class Server::Impl {
                    0,
                    0,
                    0,
-                   {}})),
+                   {},
+                   std::move(content.ask),
+                   {},
+                   0})),
         acceptor_(io_),
         beat_(io_) {
     shared_->hub.offer(std::move(content.channels), std::move(content.services), content.range);
@@ -59,6 +62,7 @@ class Server::Impl {
       acceptor_.close(ignored);
       beat_.cancel();
       for (Connection* one : shared_->connections) one->end();
+      shared_->replies.clear();
       io_.stop();
     });
     thread_.join();
@@ -170,6 +174,13 @@ void Server::tellTime(TimePoint time) {
 
 void Server::answer(Answer answer) {
   (void)impl_->post([answer = std::move(answer)](Shared& shared) { shared.hub.answer(answer); });
+}
+
+void Server::reply(std::uint64_t question, int status, std::string text) {
+  (void)impl_->post([question, status, text = std::move(text)](Shared& shared) {
+    const auto reply = shared.replies.extract(question);
+    if (!reply.empty()) reply.mapped()(status, text);
+  });
 }
 
 void Server::tellPlayback(PlaybackState state) {

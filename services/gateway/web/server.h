@@ -22,6 +22,7 @@ struct Content {
   Files files;
   std::optional<TimeRange> range = std::nullopt;  ///< time range, if clients control a
                                                   ///< recording
+  Ask ask = {};  ///< MCP; each message must get a reply. Empty: /mcp does not exist
 };
 
 struct Stats {
@@ -43,6 +44,8 @@ class Server {
   void publish(Encoded message);
   void tellTime(TimePoint time);
   void answer(Answer answer);
+  /// Answers the message of an MCP client. `status` is that of HTTP.
+  void reply(std::uint64_t question, int status, std::string text);
   void tellPlayback(PlaybackState state);
   void setTexts(std::string healthz, std::string metrics);
   Stats stats() const;

@@ -9,6 +9,8 @@
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket.hpp>
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <memory>
 #include <set>
 #include <string>
@@ -25,7 +27,7 @@ namespace beast = boost::beast;
 namespace http = beast::http;
 namespace websocket = beast::websocket;
 using tcp = asio::ip::tcp;
-using Request = http::request<http::empty_body>;
+using Request = http::request<http::string_body>;
 
 /// A connection, closed when the server ends.
 class Connection {
@@ -33,6 +35,9 @@ class Connection {
   virtual ~Connection() = default;
   virtual void end() = 0;
 };
+
+/// Sends the answer to a question of an MCP client. `status` is that of HTTP.
+using Reply = std::function<void(int status, std::string text)>;
 
 struct Shared {
   Options options;
@@ -43,6 +48,9 @@ struct Shared {
   std::chrono::steady_clock::time_point texts_at{};  ///< last update by the service's loop
   std::uint64_t bytes_sent = 0, messages_sent = 0, requests = 0;
   std::set<Connection*> connections;
+  Ask ask;                                 ///< empty: /mcp does not exist
+  std::map<std::uint64_t, Reply> replies;  ///< by the number of the question
+  std::uint64_t questions = 0;
 };
 
 /// Reads and answers requests, and passes the socket to a client after an upgrade.

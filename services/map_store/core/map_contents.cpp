@@ -103,6 +103,7 @@ void readMeta(const Connection& connection, WholeMap& map) {
     if (row.text(0) == "revision") map.revision = row.id(1);
     if (row.text(0) == "tile_size_m" && row.real(1) > 0.0) map.tile_size_m = row.real(1);
     if (row.text(0) == "earth_anchor") map.earth_anchor = row.text(1);
+    if (row.text(0) == "cameras") map.cameras = row.text(1);
   }));
 }
 
@@ -136,6 +137,7 @@ Batch wholeBatch(const WholeMap& map, const Objects& working, const mapping::Uns
   batch.working = &working;
   batch.graph = &graph;
   batch.earth_anchor = map.earth_anchor;
+  batch.cameras = map.cameras;
   for (const auto& [id, object] : map.contents.objects) {
     batch.left[id] = {object.world, object.belief};
     if (object.ended) {

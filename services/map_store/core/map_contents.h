@@ -16,6 +16,7 @@ struct WholeMap {
   std::uint64_t revision = 0;
   std::int64_t schema = 0;
   std::string earth_anchor;  ///< position of M on Earth (earth_place.h); empty if not known
+  std::string cameras;       ///< what its cameras see (mapping/frames/sight.h); empty if not known
   /// Number of rows, and of parts of the graph, that were left out because they were unreadable.
   std::uint64_t malformed = 0;
 };

@@ -326,8 +326,10 @@ Written MapDatabase::putAll(const Batch& batch, Change& change) {
   for (const ObjectId object : change.to_derive) derive(object, batch, change);
   if (batch.facts != nullptr) writeFacts(connection_, *batch.facts);
   putWorking(*batch.working, change);
-  if (!batch.earth_anchor.empty()) {
-    need(connection_.run("REPLACE INTO meta VALUES('earth_anchor', ?1)", batch.earth_anchor));
+  for (const auto& [key, value] :
+       {std::pair("earth_anchor", &batch.earth_anchor), std::pair("cameras", &batch.cameras)}) {
+    if (value->empty()) continue;
+    need(connection_.run("REPLACE INTO meta VALUES(?1, ?2)", std::string_view(key), *value));
   }
   return nextRevision(change);
 }

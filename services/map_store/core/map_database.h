@@ -7,6 +7,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/base/result.h"
@@ -55,6 +56,7 @@ struct Batch {
   std::set<TrackId> regrouped = {};
   std::int64_t acknowledged = 0;  ///< the server has the entries of the outbox up to this one
   std::string earth_anchor = {};  ///< position of M on Earth (earth_place.h); empty: not changed
+  std::string cameras = {};  ///< what the cameras see (mapping/frames/sight.h); empty: not changed
 };
 
 struct Written {
@@ -69,6 +71,12 @@ struct Found {
   std::vector<ObjectBelief> beliefs;  ///< the objects in full, for kById and inFullNear
   bool truncated = false;
   std::uint64_t malformed = 0;  ///< rows that were left out because their belief could not be read
+};
+
+/// An object that is history, with its last stored belief.
+struct EndedObject {
+  PlacedBelief last;
+  Removal end;
 };
 
 struct StoredPlace {
@@ -103,6 +111,8 @@ class MapReader {
   Result<std::vector<StoredPlace>> places() const;
   /// The place of one object; nothing if it is not on the map.
   Result<std::optional<StoredPlace>> placeOf(ObjectId id) const;
+  /// The objects that are history, by the time of their end; rows that cannot be read are left out.
+  Result<std::vector<EndedObject>> ended() const;
   /// The objects that were merged into an object, by id.
   Result<std::vector<ObjectId>> mergedInto(ObjectId id) const;
   /// The working set of the last commit; nothing on an empty map.
@@ -113,11 +123,15 @@ class MapReader {
   /// The `world` numbers of the map's objects.
   Result<std::set<std::uint64_t>> worlds() const;
   /// The position of M on Earth, as earthAnchorOfMap() writes it; empty if not known.
-  Result<std::string> earthAnchor() const;
+  Result<std::string> earthAnchor() const { return meta("earth_anchor"); }
+  /// The fields of view of the last cameras, as mapping::toText() writes them; empty if not known.
+  Result<std::string> cameras() const { return meta("cameras"); }
   Result<std::uint64_t> revision() const;
   Result<ObjectId> largestId() const;
 
  private:
+  Result<std::string> meta(std::string_view key) const;
+
   const Connection* connection_;
 };
 

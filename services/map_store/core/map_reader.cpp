@@ -175,6 +175,24 @@ Result<std::vector<PlacedBelief>> MapReader::beliefs() const {
   return read.map([&] { return std::move(beliefs); });
 }
 
+Result<std::vector<EndedObject>> MapReader::ended() const {
+  std::vector<EndedObject> ended;
+  const auto take = [&](const Statement& row) {
+    auto placed = beliefFrom(row);
+    if (!placed) return;
+    ended.push_back({std::move(*placed),
+                     {static_cast<EventKind>(std::clamp<std::int64_t>(
+                          row.integer(5) - 1, 0, static_cast<int>(EventKind::kRelocalised))),
+                      fromNanoseconds(row.integer(6)), row.id(7)}});
+  };
+  return connection_
+      ->forRows(std::string(kColumns) +
+                    ", o.gone, o.gone_ns, coalesce(o.merged_into, 0) FROM objects o "
+                    "WHERE o.gone <> 0 ORDER BY o.gone_ns, o.id",
+                take)
+      .map([&] { return std::move(ended); });
+}
+
 Result<Found> MapReader::inFullNear(const Eigen::Vector3d& centre, double radius,
                                     const WorldId& world, std::uint32_t limit) const {
   MapQuery query;
@@ -256,11 +274,12 @@ Result<std::set<std::uint64_t>> MapReader::worlds() const {
   });
 }
 
-Result<std::string> MapReader::earthAnchor() const {
+Result<std::string> MapReader::meta(std::string_view key) const {
   return connection_
-      ->first("SELECT value FROM meta WHERE key = 'earth_anchor'",
-              [](const Statement& row) { return row.text(0); })
-      .map([](auto anchor) { return std::move(anchor).value_or(""); });
+      ->first(
+          "SELECT value FROM meta WHERE key = ?1", [](const Statement& row) { return row.text(0); },
+          key)
+      .map([](auto value) { return std::move(value).value_or(""); });
 }
 
 Result<std::uint64_t> MapReader::revision() const {

@@ -178,6 +178,31 @@ TEST_F(Gateway, RefusesForeignHostsPagesAndProtocols) {
   serves();
 }
 
+TEST_F(Gateway, AnswersMcpClientsThatHaveTheToken) {
+  start({"http.token=s3cret"});
+  const std::string bearer = "Authorization: Bearer s3cret\r\n";
+  const std::string ping = R"({"jsonrpc":"2.0","id":1,"method":"ping"})";
+  EXPECT_EQ(post(port_, "/mcp", ping).status, 401);
+  EXPECT_EQ(post(port_, "/mcp", ping, bearer + "Origin: http://evil.example\r\n").status, 403);
+  const HttpAnswer answer = post(port_, "/mcp", ping, bearer);
+  EXPECT_EQ(answer.status, 200);
+  EXPECT_THAT(answer.text, HasSubstr("Content-Type: application/json"));
+  EXPECT_THAT(answer.text, HasSubstr(R"({"jsonrpc":"2.0","id":1,"result":{}})"));
+  EXPECT_EQ(post(port_, "/mcp?token=s3cret", ping).status, 200);
+  const std::string notice = R"({"jsonrpc":"2.0","method":"notifications/initialized"})";
+  EXPECT_EQ(post(port_, "/mcp", notice, bearer).status, 202);
+  EXPECT_EQ(post(port_, "/mcp", "{", bearer).status, 400);
+  EXPECT_EQ(post(port_, "/mcp", ping, bearer + "MCP-Protocol-Version: 1.0\r\n").status, 400);
+  EXPECT_EQ(post(port_, "/mcp", ping, bearer + "MCP-Protocol-Version: 2025-06-18\r\n").status, 200);
+  for (const char* method : {"GET", "DELETE"}) {
+    EXPECT_EQ(ask(port_, std::string(method) + " /mcp", bearer, "127.0.0.1").status, 405) << method;
+  }
+  EXPECT_EQ(post(port_, "/mcp", std::string(100 << 10U, ' '), bearer).status, 0) << "too large";
+  const std::string call = R"({"jsonrpc":"2.0","id":2,"method":"tools/call",)"
+                           R"("params":{"name":"find_objects","arguments":{}}})";
+  EXPECT_THAT(post(port_, "/mcp", call, bearer).text, HasSubstr("start perdure-map-store"));
+}
+
 TEST_F(Gateway, WantsTheTokenThatIsSet) {
   start({"http.token=s3cret"});
   EXPECT_THAT(RawClient(port_).upgrade(), HasSubstr(" 401 "));

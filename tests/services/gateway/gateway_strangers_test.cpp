@@ -9,6 +9,7 @@
 
 #include "common/bus/endpoint.h"
 #include "common/bus/topics.h"
+#include "common/bus/wait_loop.h"
 #include "tests/process/support.h"
 #include "tests/services/gateway/objects.h"
 
@@ -18,6 +19,7 @@ namespace {
 using namespace std::chrono_literals;
 using namespace perdure::test;
 using nlohmann::json;
+using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 /// A drive at 10 Hz with all displayed topics: three cars, one of which the vehicle passes.
@@ -160,6 +162,53 @@ class Drive {
   std::thread thread_;
 };
 
+/// Answers queries by id, class, place and for all objects about the first two cars of the drive.
+class MapStore {
+ public:
+  explicit MapStore(const bus::Participant& participant)
+      : replies_(participant, bus::kTopic<MapReply>),
+        queries_(participant, bus::kTopic<MapQuery>),
+        loop_(participant) {
+    loop_.on(queries_, [this](const MapQuery& query) { answer(query); });
+    thread_ = std::thread([this] { loop_.run(); });
+  }
+  ~MapStore() {
+    loop_.stop();
+    thread_.join();
+  }
+  MapStore(const MapStore&) = delete;
+  MapStore& operator=(const MapStore&) = delete;
+
+ private:
+  void answer(const MapQuery& query) {
+    if (query.kind == MapQueryKind::kGraph) return;  // the drive answers
+    MapReply reply;
+    reply.client = query.client;
+    reply.request = query.request;
+    for (ObjectId id = 1; id <= 2; ++id) {
+      if (query.kind == MapQueryKind::kById && query.object_id != id) continue;
+      ObjectBelief car = objectAt(id, {10.0 * static_cast<double>(id), 3.0, 0});
+      car.seen_from[8] = 20.0F;
+      MapObject object;
+      object.id = id;
+      object.class_name = "car";
+      object.existence = car.existence;
+      object.class_probability = car.best().probability;
+      object.mean = car.best().mean;
+      object.first_seen = car.first_seen;
+      object.last_seen = car.last_seen;
+      reply.objects.push_back(object);
+      if (query.kind == MapQueryKind::kById) reply.beliefs.push_back(car);
+    }
+    (void)replies_.write(reply);
+  }
+
+  bus::Writer<MapReply> replies_;
+  bus::Reader<MapQuery> queries_;
+  bus::WaitLoop loop_;
+  std::thread thread_;
+};
+
 class Strangers : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -182,9 +231,12 @@ class Strangers : public ::testing::Test {
     })) << gateway_->log();
   }
   json answer(const std::string& script, std::vector<std::string> more) {
+    more.insert(more.begin(), port_);
+    return answerOf(script, more);
+  }
+  json answerOf(const std::string& script, const std::vector<std::string>& more) {
     std::vector<std::string> command{
-        "node", (sources() / "tests/services/gateway/strangers" / script).string(), modules_,
-        port_};
+        "node", (sources() / "tests/services/gateway/strangers" / script).string(), modules_};
     command.insert(command.end(), more.begin(), more.end());
     Child node(command, folder_.file(script));
     status_ = node.wait(260s);
@@ -207,6 +259,37 @@ TEST_F(Strangers, FoxglovesClientSubscribesEveryChannelInBothSubprotocols) {
     EXPECT_THAT(said["problems"], IsEmpty()) << said.dump(1);
     EXPECT_EQ(said["channels"], 25);
     EXPECT_EQ(status_, 0);
+  }
+}
+
+TEST_F(Strangers, TheSdkOfTheModelContextProtocolAsksTheMap) {
+  const Drive drive(participant_);
+  const MapStore store(participant_);
+  const std::string url = "http://127.0.0.1:" + port_ + "/mcp";
+  const std::string perdure = (programs() / "perdure").string();
+  for (const std::string revision : {"2024-11-05", "2025-03-26", "2025-06-18", ""}) {
+    for (const auto& transport : {std::vector<std::string>{"http", url, "none", revision},
+                                  {"stdio", revision, perdure, "mcp"}}) {
+      const json said = answerOf("mcp.mjs", transport);
+      ASSERT_TRUE(said.is_object()) << contentsOf(folder_.file("mcp.mjs")) << gateway_->log();
+      EXPECT_THAT(said["problems"], IsEmpty()) << said.dump(1);
+      EXPECT_EQ(said["server"], "perdure");
+      EXPECT_EQ(said["agreed"], revision.empty() ? "2025-06-18" : revision) << transport[0];
+      EXPECT_EQ(said["tools"].size(), 5u);
+      EXPECT_EQ(said["results"]["find_objects"]["items"], 2);
+      EXPECT_EQ(status_, 0);
+    }
+  }
+}
+
+TEST_F(Strangers, TheConformanceClientOfTheModelContextProtocolFindsNoFault) {
+  const std::string client = modules_ + "/@modelcontextprotocol/conformance/dist/index.js";
+  for (const char* scenario : {"server-initialize", "ping", "tools-list"}) {
+    Child node({"node", client, "server", "--url", "http://127.0.0.1:" + port_ + "/mcp",
+                "--scenario", scenario},
+               folder_.file(scenario));
+    EXPECT_EQ(node.wait(60s), 0) << scenario << "\n" << node.log();
+    EXPECT_THAT(node.log(), HasSubstr("1/1, 0 failed, 0 warnings")) << scenario;
   }
 }
 

@@ -149,9 +149,20 @@ std::string RawClient::readMessage(std::uint32_t subscription) {
 
 HttpAnswer get(std::uint16_t port, const std::string& target, const std::string& more,
                const std::string& host) {
+  return ask(port, "GET " + target, more, host);
+}
+
+HttpAnswer post(std::uint16_t port, const std::string& target, const std::string& body,
+                const std::string& more) {
+  return ask(port, "POST " + target,
+             more + "Content-Length: " + std::to_string(body.size()) + "\r\n", "127.0.0.1", body);
+}
+
+HttpAnswer ask(std::uint16_t port, const std::string& line, const std::string& more,
+               const std::string& host, const std::string& body) {
   RawClient client(port);
-  client.send("GET " + target + " HTTP/1.1\r\nHost: " + host + "\r\nConnection: close\r\n" + more +
-              "\r\n");
+  client.send(line + " HTTP/1.1\r\nHost: " + host + "\r\nConnection: close\r\n" + more + "\r\n" +
+              body);
   const std::string head = client.readHead();
   if (head.size() < 12) return {};
   return {std::stoi(head.substr(9, 3)), head + client.readBody(std::size_t{1} << 24U)};

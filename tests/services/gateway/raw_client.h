@@ -56,5 +56,10 @@ struct HttpAnswer {
 };
 HttpAnswer get(std::uint16_t port, const std::string& target, const std::string& more = "",
                const std::string& host = "127.0.0.1");
+HttpAnswer post(std::uint16_t port, const std::string& target, const std::string& body,
+                const std::string& more = "");
+/// `line`: method and target.
+HttpAnswer ask(std::uint16_t port, const std::string& line, const std::string& more,
+               const std::string& host, const std::string& body = "");
 
 }  // namespace perdure::gateway::test

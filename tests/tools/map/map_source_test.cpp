@@ -60,7 +60,9 @@ class MapSource : public ::testing::Test {
     Objects later = both;
     later.objects.pop_back();
     const map_store::Removal merged{EventKind::kMerged, fromNanoseconds(900'000'000'000), 20};
-    EXPECT_TRUE(database.write({&later, {}, {{30, merged}}}).has_value());
+    map_store::Batch last{&later, {}, {{30, merged}}};
+    last.cameras = "0.25 0.5 ";
+    EXPECT_TRUE(database.write(last).has_value());
   }
 
   static mapping::SavedEdge edge(mapping::AnchorId a, mapping::AnchorId b, mapping::EdgeKind kind,
@@ -83,7 +85,7 @@ class MapSource : public ::testing::Test {
     MapQuery query;
     query.kind = MapQueryKind::kById;
     query.object_id = id;
-    const auto reply = askMapFile(path_, query, frame);
+    const auto reply = MapFile(path_).ask(query, frame);
     EXPECT_THAT(reply.objects, SizeIs(1));
     return reply.objects.empty() ? MapObject{} : reply.objects.front();
   }
@@ -95,7 +97,7 @@ class MapSource : public ::testing::Test {
 TEST_F(MapSource, TellsTheGraphAsTheRunningServiceWould) {
   MapQuery query;
   query.limit = 1000;
-  const MapReply graph = askGraphOfFile(path_, query);
+  const MapReply graph = MapFile(path_).graph(query);
   ASSERT_THAT(graph.anchors, SizeIs(3));
   EXPECT_EQ(graph.anchor_count, 3u);
   EXPECT_DOUBLE_EQ(graph.anchors[2].p.y(), kShift_m);
@@ -123,15 +125,15 @@ TEST_F(MapSource, PlacesOfAFileAreLookedForInTheChosenFrame) {
   query.kind = MapQueryKind::kByRadius;
   query.low = {200, kShift_m + 3, 0};
   query.radius = 2.0;
-  EXPECT_THAT(askMapFile(path_, query).objects, SizeIs(1));
-  EXPECT_THAT(askMapFile(path_, query, MapFrameChoice::kW).objects, SizeIs(0));
+  EXPECT_THAT(MapFile(path_).ask(query).objects, SizeIs(1));
+  EXPECT_THAT(MapFile(path_).ask(query, MapFrameChoice::kW).objects, SizeIs(0));
   query.low = {203, 0, 0};
-  EXPECT_THAT(askMapFile(path_, query, MapFrameChoice::kW).objects, SizeIs(1));
-  EXPECT_THAT(askMapFile(path_, query).objects, SizeIs(0));
+  EXPECT_THAT(MapFile(path_).ask(query, MapFrameChoice::kW).objects, SizeIs(1));
+  EXPECT_THAT(MapFile(path_).ask(query).objects, SizeIs(0));
 }
 
 TEST_F(MapSource, TellsWhatTheGraphKnowsOfAnObject) {
-  const Standing there = askStanding(path_, 20);
+  const Standing there = MapFile(path_).standing(20);
   ASSERT_TRUE(there.newest && there.earlier);
   EXPECT_EQ(there.newest->anchor, 3u);
   EXPECT_EQ(there.earlier->anchor, 1u);
@@ -157,7 +159,7 @@ TEST_F(MapSource, TellsWhatTheGraphKnowsOfAnObject) {
 }
 
 TEST_F(MapSource, TellsNoLoopsThatEndElsewhere) {
-  const Standing there = askStanding(path_, 10);
+  const Standing there = MapFile(path_).standing(10);
   EXPECT_EQ(there.newest->anchor, 1u);
   EXPECT_FALSE(there.earlier);
   EXPECT_THAT(there.loops, SizeIs(2)) << "both end at anchor 1";
@@ -171,9 +173,21 @@ TEST_F(MapSource, TellsNoLoopsThatEndElsewhere) {
   EXPECT_THAT(toText(nowhere), HasSubstr("belongs to no anchor"));
 }
 
+TEST_F(MapSource, HasTheHistoryTheCamerasAndTheTime) {
+  MapFile file(path_);
+  const auto ended = file.ended();
+  ASSERT_THAT(ended, SizeIs(1));
+  EXPECT_EQ(ended[0].last.belief.id, 30u);
+  EXPECT_EQ(ended[0].end.kind, EventKind::kMerged);
+  EXPECT_EQ(ended[0].end.merged_into, 20u);
+  EXPECT_EQ(toSeconds(ended[0].end.time), 900.0);
+  EXPECT_THAT(file.cameras(), ElementsAre(mapping::Sight{0.25, 0.5}));
+  EXPECT_EQ(file.time(), workingSet(1, {}).stamp.time);
+}
+
 TEST_F(MapSource, AnObjectThatTheFileDoesNotHaveIsAnError) {
-  EXPECT_THROW((void)askStanding(path_, 30), StartupError) << "merged away";
-  EXPECT_THROW((void)askStanding(folder_.file("none.sqlite"), 20), StartupError);
+  EXPECT_THROW((void)MapFile(path_).standing(30), StartupError) << "merged away";
+  EXPECT_THROW((void)MapFile(folder_.file("none.sqlite")).standing(20), StartupError);
 }
 
 }  // namespace

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "tools/outputs/ledger_json.h"
+#include "common/types/ledger_json.h"
 
 namespace perdure::tools {
 namespace {

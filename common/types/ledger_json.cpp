@@ -1,10 +1,10 @@
-#include "tools/outputs/ledger_json.h"
+#include "common/types/ledger_json.h"
 
 #include <fmt/format.h>
 
 #include <string>
 
-namespace perdure::tools {
+namespace perdure {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -49,4 +49,4 @@ Json toJson(const Ledger& ledger) {
   return {{"existence", existence}, {"classes", classes}, {"ousted", ousted}};
 }
 
-}  // namespace perdure::tools
+}  // namespace perdure

@@ -5,7 +5,7 @@
 
 #include "common/types/ledger.h"
 
-namespace perdure::tools {
+namespace perdure {
 
 /// Rounds to ten significant digits, because results of different compilers differ in the last
 /// bits.
@@ -15,4 +15,4 @@ double rounded(double value);
 /// are called "kind_N".
 nlohmann::ordered_json toJson(const Ledger& ledger);
 
-}  // namespace perdure::tools
+}  // namespace perdure
