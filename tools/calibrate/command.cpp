@@ -268,7 +268,7 @@ void addFromMotion(CLI::App& calibrate) {
 void setUpCalibrate(CLI::App& command) {
   auto line = std::make_shared<CommandLine>();
   addCommon(command, *line, "Folder for rig.yaml, calibration.json and pictures");
-  addLens(command, *line, "Model of the lens; as the drive's own calibration says where not given");
+  addLens(command, *line, "Model of the lens (default: that of the drive's own calibration)");
   command.add_option("--data", line->read.data,
                      "Drive in front of the board (dataset folder or .mcap), or a folder of "
                      "pictures for the lens alone");
@@ -278,7 +278,7 @@ void setUpCalibrate(CLI::App& command) {
       ->capture_default_str();
   command.add_flag("--intrinsics-only", line->calibrate.intrinsics_only, "The lens alone");
   command.add_flag("--hold-lens", line->calibrate.place.hold_lens,
-                   "The lens stays as the most different views have it");
+                   "Keep the lens that is estimated from the most different views");
   command.add_option("--gravity", line->calibrate.place.gravity, "At the place of recording, m/s²")
       ->check(CLI::Range(9.7, 9.9))
       ->capture_default_str();

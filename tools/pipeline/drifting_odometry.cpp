@@ -46,7 +46,8 @@ void describe(DriftConfig& config, config::Fields& fields) {
                 {"the way is reported longer by this share"});
   fields.number("scale_sigma", config.scale_sigma, between(0, 0.5),
                 {"deviation that is declared of it; 0: as large as `scale`"});
-  fields.number("yaw_walk", config.yaw_walk, atLeast(0), {"of the yaw, by way", "rad/√m"});
+  fields.number("yaw_walk", config.yaw_walk, atLeast(0),
+                {"random walk of the yaw over the distance", "rad/√m"});
   fields.integer("seed", config.seed, atLeast(0), {"of the walk; --seed sets it too"});
   fields.boolean("own_frame", config.own_frame,
                  {"W begins level at the body, with yaw 0, in the first frame that is used; "

@@ -107,9 +107,10 @@ void addOptions(CLI::App& command, RecordOptions& options) {
       ->capture_default_str()
       ->check(CLI::Range(1.0, 86400.0));
   command
-      .add_option("--quota", options.quota,
-                  "bytes that all recordings in the folder may take (8GB); then the oldest go; 0: "
-                  "no quota")
+      .add_option(
+          "--quota", options.quota,
+          "bytes that all recordings in the folder may take (8GB); then the oldest are deleted; 0: "
+          "no quota")
       ->transform(CLI::AsSizeValue(false));
   command
       .add_option("--keep-free", options.keep_free,
@@ -124,7 +125,7 @@ void addOptions(CLI::App& command, RecordOptions& options) {
   command.add_option("--after", options.store.after_s, "seconds that follow the fault in its file")
       ->capture_default_str()
       ->check(CLI::NonNegativeNumber);
-  command.add_option("--memory", options.store.memory, "most that --last holds (512MB)")
+  command.add_option("--memory", options.store.memory, "largest memory of --last (512MB)")
       ->transform(CLI::AsSizeValue(false));
   command
       .add_option("--fault", options.fault, "what counts: a process that is failed, or degraded")

@@ -37,7 +37,7 @@ std::string fixOf(const std::string& code) {
   if (code == "server_schema") {
     return "use the same version of Perdure for all, and a database made with ENCODING 'UTF8'";
   }
-  if (code == "server_full") return "free space on the server, or allow it more connections";
+  if (code == "server_full") return "free space on the server";
   if (code == "server_busy") return "see what else keeps the server busy";
   if (code == "server_overtaken") {
     return "give each vehicle a store.vehicle and a file of its own, and end the other process";

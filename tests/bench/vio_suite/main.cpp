@@ -166,14 +166,15 @@ int main(int argc, char** argv) {
   perdure::bench::CommandLine line;
   CLI::App app("vio over clips of real and simulated motion: accuracy, consistency and time");
   app.add_option("--data", line.data, "Real clips are in its euroc_semi")->capture_default_str();
-  app.add_option("--cache", line.cache, "Clips are made here, once")->capture_default_str();
+  app.add_option("--cache", line.cache, "Folder in which clips are rendered once")
+      ->capture_default_str();
   app.add_option("--only", line.only, "Names of clips")->delimiter(',');
-  app.add_option("--half", line.half, "tuned or judged; both where not given")
+  app.add_option("--half", line.half, "tuned or judged (default: both)")
       ->check(CLI::IsMember({"tuned", "judged"}));
   app.add_option("--set", line.set, "KEY=VALUE, of all variants");
   app.add_option("--variant", line.variants, "NAME:KEY=VALUE,KEY=VALUE …; may be given again");
   app.add_option("--from", line.from_s, "Begin so many seconds into each clip");
-  app.add_option("--until", line.until_s, "And stop there");
+  app.add_option("--until", line.until_s, "Stop at this time");
   app.add_option("--starts", line.starts,
                  "Cut each clip at so many random places instead, and "
                  "judge how vio starts in motion");
@@ -182,11 +183,11 @@ int main(int argc, char** argv) {
   app.add_option("--readout", line.readout_s,
                  "Seconds of a rolling shutter that vio is told, whatever the clip has");
   app.add_option("--jobs", line.jobs, "Clips at a time")->capture_default_str();
-  app.add_option("--csv", line.csv, "The table goes there, too");
+  app.add_option("--csv", line.csv, "Also write the table to this file");
   app.add_flag("--no-klt", line.no_klt, "Without OpenCV's tracking beside it");
   app.add_flag("--innovations", line.innovations, "Size and whiteness of the innovations");
   app.add_flag("--reasons", line.reasons, "Errors by time and what was counted, to stderr");
-  app.add_flag("--list", line.list, "The clips, and what each has of its own");
+  app.add_flag("--list", line.list, "List the clips and their options");
   CLI11_PARSE(app, argc, argv);
   try {
     return perdure::bench::run(line);

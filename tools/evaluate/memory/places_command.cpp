@@ -169,7 +169,9 @@ PlacesJudge addPlacesOptions(CLI::App& memory) {
         memory.add_option("--along", options.along_m,
                           "Limits of an object behind its place, along the ray from the body, m"),
         memory.add_option("--across", options.across_m, "Its largest distance from the ray, m"),
-        memory.add_option("--least-frames", options.least_frames, "Shorter visits keep no id")
+        memory
+            .add_option("--least-frames", options.least_frames,
+                        "Visits with fewer frames are not counted")
             ->check(CLI::Range(1, 1000000))}) {
     option->needs(places)->capture_default_str();
   }
