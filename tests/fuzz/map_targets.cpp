@@ -68,7 +68,7 @@ bool takePart(View bytes) {
 }
 
 std::vector<Bytes> parts() {
-  const auto map = test::RandomGraph(1).map({});
+  const auto map = map_store::test::RandomGraph(1).map({});
   std::vector<Bytes> seeds;
   for (const std::uint64_t id : {1U, 2U, 3U}) {
     seeds.push_back(encodeAnchor(map.anchors.at(id).anchor));
@@ -192,7 +192,8 @@ bool takeGraph(View bytes) {
   require(attempt([] { sweepGraph(emptyFile()); }).has_value(), "a graph is swept");
   const auto swept = readGraph(emptyFile());
   require(swept && swept->malformed == 0, "what is swept is whole");
-  require(test::bitsOf(swept->map) == test::bitsOf(graph->map), "and the rest as it was");
+  require(map_store::test::bitsOf(swept->map) == map_store::test::bitsOf(graph->map),
+          "and the rest as it was");
   return graph->malformed == 0 && !graph->map.anchors.empty();
 }
 
@@ -213,8 +214,8 @@ Bytes bytesOfNumbers(std::initializer_list<double> numbers) {
   return bytes;
 }
 
-Bytes graphSeed(std::uint32_t seed, const test::GraphSize& size) {
-  const auto map = test::RandomGraph(seed).map(size);
+Bytes graphSeed(std::uint32_t seed, const map_store::test::GraphSize& size) {
+  const auto map = map_store::test::RandomGraph(seed).map(size);
   Bytes bytes;
   std::uint64_t number = 0;
   for (const auto& name : map.classes) put(bytes, Table::kClass, number++, bytesOf(name));
