@@ -4,6 +4,10 @@
 
 namespace perdure {
 
+bool looksAlongGround(const CameraModel& camera) {
+  return std::abs(camera.T_BC().R()(2, 2)) < std::sin(M_PI / 3.0);
+}
+
 void forGroundInView(const CameraModel& camera, const RigidTransform& T_GB, const GroundGrid& grid,
                      const std::function<void(int, int)>& visit) {
   const RigidTransform T_CG = (T_GB * camera.T_BC()).inverse();

@@ -7,6 +7,10 @@
 
 namespace perdure {
 
+/// Whether the camera of a level body looks less than 60° up or down. Anchors of a map are level
+/// poses; what another camera saw from them is not known, for example that of an upright phone.
+bool looksAlongGround(const CameraModel& camera);
+
 /// Level ground as cells: cell (i, j) has its centre at ((i + 1/2) cell_m, (j + 1/2) cell_m).
 struct GroundGrid {
   double cell_m = 1.0;    ///< side of a cell

@@ -168,11 +168,12 @@ void Node::followGraph(std::int64_t now_ns) {
 void Node::onMapGraph(const MapReply& reply) {
   graph_ = reply;
   why_no_graph_ = reply.anchors.empty() ? "The map has no anchors yet." : "";
-  for (const auto& camera : cameras_) {
-    if (!camera || !wants(kMapSeen)) continue;
+  if (wants(kMapSeen)) {
     const MapReply here = graphOn(map_.mapOf(world()), reply);
-    seen_ground_.addAnchors(*camera, here, map_.T_MW(world()), groundHeight());
-    break;  // the anchors replace those of an earlier call
+    seen_ground_.forgetAnchors();
+    for (const auto& camera : cameras_) {
+      if (camera) seen_ground_.addAnchors(*camera, here, map_.T_MW(world()), groundHeight());
+    }
   }
   sendWanted({kMapGraph, kMapGraphScene, kMapSeen});
 }

@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "common/base/errors.h"
+#include "common/camera/ground_view.h"
 #include "common/mapping/frames/laid_belief.h"
 #include "common/mapping/map_frames.h"
 #include "common/math/so3.h"
@@ -104,8 +105,18 @@ LookSettings readLookSettings(const std::string& rig, const std::string& config)
   const Calibration calibration =
       drive ? replay::Dataset::open({.path = rig, .decode = false})->calibration()
             : replay::readRig(rig);
-  return {CameraModel(calibration.cameras.front()),
-          semantic_filter::loadClassPriors(priors.string()), filter.filter};
+  if (calibration.cameras.empty()) {
+    throw StartupError(ExitCode::kData, rig + " has no camera; give a rig file with cam0");
+  }
+  const CameraModel camera(calibration.cameras.front());
+  if (!looksAlongGround(camera)) {
+    throw StartupError(ExitCode::kData,
+                       rig +
+                           ": the camera looks up or down if the body is level. The map stores "
+                           "level poses, so what it saw is not known; give a rig whose body has "
+                           "its z axis up");
+  }
+  return {camera, semantic_filter::loadClassPriors(priors.string()), filter.filter};
 }
 
 std::vector<Candidate> candidatesOf(const MapToLook& map, const std::vector<TimedView>& planned,

@@ -55,9 +55,13 @@ std::vector<TimedView> viewsOf(const LookCommand& command, const MapToLook& map,
   }
   if (!command.around.empty()) {
     const auto& a = command.around;
+    if (a[2] <= 0.0) {
+      throw StartupError(ExitCode::kUsage,
+                         fmt::format("--around: a radius of {} m is not above 0", a[2]));
+    }
     auto views = posesAround(map, {a[0], a[1]}, a[2], at);
     if (views.empty()) {
-      throw StartupError(ExitCode::kFailure,
+      throw StartupError(ExitCode::kData,
                          fmt::format("{}: no anchor lies within {} m of {} {}; give a larger "
                                      "radius, or poses with --pose or --poses",
                                      command.map, a[2], a[0], a[1]));

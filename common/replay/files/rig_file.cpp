@@ -27,9 +27,9 @@ std::string indented(const std::string& text) {
 
 SensorFile opened(const std::filesystem::path& path) {
   if (!std::filesystem::is_regular_file(path)) {
-    throw StartupError(
-        ExitCode::kUnavailable,
-        path.string() + " is no rig file; `perdure calibrate` writes one (rig.yaml)");
+    throw StartupError(ExitCode::kUnavailable,
+                       "{} {}; give a rig file, as `perdure calibrate` writes (rig.yaml)",
+                       path.c_str(), std::filesystem::exists(path) ? "is no file" : "is missing");
   }
   return SensorFile(path);
 }

@@ -26,7 +26,7 @@ void SeenGround::add(const CameraModel& camera, const RigidTransform& T_WB, doub
 
 void SeenGround::addAnchors(const CameraModel& camera, const MapReply& graph,
                             const RigidTransform& T_MW, double ground_m) {
-  before_.clear();
+  if (!looksAlongGround(camera)) return;
   const RigidTransform T_WM = T_MW.inverse();
   for (const MapAnchor& anchor : graph.anchors) {
     const Eigen::Quaterniond q(Eigen::AngleAxisd(anchor.yaw, Eigen::Vector3d::UnitZ()));

@@ -15,10 +15,11 @@ class SeenGround {
   /// Marks what a camera has in view. `ground_m`: height of the ground in W.
   void add(const CameraModel& camera, const RigidTransform& T_WB, double ground_m, TimePoint time,
            const WorldId& world);
-  /// Marks what the camera had in view at the anchors, which replace those of an earlier call.
-  /// Their times are not known. `graph` must be in M.
+  /// Marks what the camera had in view at the anchors, at unknown times. `graph` must be in M.
+  /// Cameras that look up or down on a level body are left out.
   void addAnchors(const CameraModel& camera, const MapReply& graph, const RigidTransform& T_MW,
                   double ground_m);
+  void forgetAnchors() { before_.clear(); }
   void clear();
   bool empty() const { return seen_.empty() && before_.empty(); }
 

@@ -68,8 +68,7 @@ class Estimator {
   /// Initialises the state from a saved state, for which fits() must succeed.
   void restore(const SavedState& saved);
   /// Checks that a saved state has the cameras, shutters and estimated quantities of this filter.
-  /// Fails with state_other_cameras, state_other_shutter, state_other_gyro_scale or
-  /// state_other_readout.
+  /// Fails with state_other_cameras, state_other_shutter or state_other_estimates.
   Result<void> fits(const SavedState& saved) const;
   /// Returns the state for restore(); the caller sets world and next_track. Call it only if
   /// started().

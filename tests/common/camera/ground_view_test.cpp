@@ -31,6 +31,13 @@ Cells inView(double yaw) {
   return cells;
 }
 
+TEST(GroundView, ACameraOfALevelBodyLooksAlongTheGroundOrUp) {
+  CameraCalibration upright_phone = forward().calibration();
+  upright_phone.T_BC = RigidTransform();  // the optical axis is the body's z axis
+  EXPECT_TRUE(looksAlongGround(forward()));
+  EXPECT_FALSE(looksAlongGround(CameraModel(upright_phone)));
+}
+
 TEST(GroundView, IsTheGroundAheadWithinReach) {
   const Cells cells = inView(0.0);
   EXPECT_TRUE(cells.contains({15, 0}));

@@ -189,15 +189,7 @@ class MapStore {
       if (query.kind == MapQueryKind::kById && query.object_id != id) continue;
       ObjectBelief car = objectAt(id, {10.0 * static_cast<double>(id), 3.0, 0});
       car.seen_from[8] = 20.0F;
-      MapObject object;
-      object.id = id;
-      object.class_name = "car";
-      object.existence = car.existence;
-      object.class_probability = car.best().probability;
-      object.mean = car.best().mean;
-      object.first_seen = car.first_seen;
-      object.last_seen = car.last_seen;
-      reply.objects.push_back(object);
+      reply.objects.push_back(test::rowOf(car));
       if (query.kind == MapQueryKind::kById) reply.beliefs.push_back(car);
     }
     (void)replies_.write(reply);

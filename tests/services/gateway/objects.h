@@ -37,6 +37,19 @@ inline ObjectBelief objectAt(ObjectId id, const Eigen::Vector3d& p,
   return object;
 }
 
+/// The object as map_store lists it.
+inline MapObject rowOf(const ObjectBelief& belief) {
+  MapObject row;
+  row.id = belief.id;
+  row.class_name = belief.best().name;
+  row.existence = belief.existence;
+  row.class_probability = belief.best().probability;
+  row.mean = belief.best().mean;
+  row.first_seen = belief.first_seen;
+  row.last_seen = belief.last_seen;
+  return row;
+}
+
 inline Objects frameOf(std::uint64_t sequence, std::vector<ObjectBelief> objects) {
   Objects frame;
   frame.stamp = {42, sequence,

@@ -169,6 +169,14 @@ TEST_F(MapLook, WrongRequestsAreRefusedWithTheirCause) {
   EXPECT_THAT(no_tum.second, HasSubstr("plan.tum"));
   const auto no_config = fault({"--pose", "0", "0", "1", "0", "--config", "absent.yaml"});
   EXPECT_THAT(no_config.second, HasSubstr("absent.yaml"));
+  const auto no_radius = fault({"--around", "0", "0", "-3"});
+  EXPECT_EQ(no_radius.first, ExitCode::kUsage);
+  EXPECT_THAT(no_radius.second, HasSubstr("radius of -3 m"));
+  Calibration upright_phone;
+  upright_phone.cameras = {semantic_filter::testing::makeCamera()};
+  upright_phone.cameras[0].T_BC = RigidTransform();
+  std::ofstream(rig_) << replay::rigText(upright_phone, "test");
+  EXPECT_THAT(fault({"--pose", "0", "0", "1", "0"}).second, HasSubstr("looks up or down"));
 }
 
 }  // namespace

@@ -61,15 +61,7 @@ class Town : public mcp::Map {
           (query.kind == MapQueryKind::kByClass && query.class_name == belief.best().name) ||
           (query.kind == MapQueryKind::kByBox && in_box);
       if (!asked) continue;
-      MapObject object;
-      object.id = belief.id;
-      object.class_name = belief.best().name;
-      object.existence = belief.existence;
-      object.class_probability = belief.best().probability;
-      object.mean = belief.best().mean;
-      object.first_seen = belief.first_seen;
-      object.last_seen = belief.last_seen;
-      reply.objects.push_back(object);
+      reply.objects.push_back(rowOf(belief));
       if (query.kind == MapQueryKind::kById) reply.beliefs.push_back(belief);
     }
     return reply;
