@@ -133,7 +133,7 @@ class Choice {
   std::string imagesOfOthers() const {
     for (const auto& [name, topic] : topics_) {
       const bool ours = topic.type == kImage || topic.type == kCompressed;
-      if (!ours && topic.messages > 0 && topic.type.ends_with("Image"))
+      if (!ours && topic.messages > 0 && topic.type.find("Image") != std::string::npos)
         return "; those on " + name + " are " + topic.type + ", which is not read";
     }
     return "";

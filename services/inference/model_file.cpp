@@ -21,8 +21,9 @@ std::string readBytes(const fs::path& path, const std::string& what, const std::
   }
   std::error_code error;
   if (!fs::is_regular_file(path, error)) {
-    const char* why = fs::is_directory(path, error) ? " is a folder; " : " is missing; ";
-    throw StartupError(ExitCode::kUnavailable, what + " " + path.string() + why + fix);
+    const std::string why =
+        fs::is_directory(path, error) ? whyFolderIsNoNetwork(path) + "; " : "is missing; ";
+    throw StartupError(ExitCode::kUnavailable, what + " " + path.string() + " " + why + fix);
   }
   std::ifstream in(path, std::ios::binary);
   std::ostringstream bytes;
@@ -40,7 +41,29 @@ std::string listOf(const std::vector<fs::path>& paths) {
   return text;
 }
 
+/// Core ML's .mlmodel begins with a version, as ONNX does. Its second field is a message that
+/// begins with a field of its own; that of ONNX is the name of the program that wrote the file.
+bool isCoreMl(std::string_view begins) {
+  constexpr std::size_t kLength = 3;  // place of the second field's length
+  if (begins.size() <= kLength || begins[0] != '\x08' || begins[2] != '\x12') return false;
+  std::size_t at = kLength;
+  while (at < begins.size() && (static_cast<unsigned char>(begins[at]) & 0x80U) != 0) ++at;
+  return at + 1 < begins.size() && (begins[at + 1] == '\x0a' || begins[at + 1] == '\x52');
+}
+
 }  // namespace
+
+std::string whyFolderIsNoNetwork(const fs::path& folder) {
+  std::error_code error;
+  if (folder.extension() == ".mlpackage" || folder.extension() == ".mlmodelc") {
+    return "is a network of Core ML; export the network as ONNX from where it was trained";
+  }
+  if (fs::exists(folder / "saved_model.pb", error)) {
+    return "is a SavedModel of TensorFlow; export it as ONNX (python -m tf2onnx.convert "
+           "--saved-model)";
+  }
+  return "is a folder";
+}
 
 std::string whyNoNetwork(std::string_view bytes) {
   const auto begins = bytes.substr(0, 512);
@@ -54,6 +77,9 @@ std::string whyNoNetwork(std::string_view bytes) {
   if (begins.substr(std::min<std::size_t>(4, begins.size())).starts_with("TFL3")) {
     return "is a network of TensorFlow Lite; export it as ONNX (python -m tf2onnx.convert "
            "--tflite)";
+  }
+  if (isCoreMl(begins)) {
+    return "is a network of Core ML; export the network as ONNX from where it was trained";
   }
   if (begins.starts_with("PK\x03\x04")) {
     return "is a ZIP archive, as PyTorch's .pt; unpack it, or export the network as ONNX";

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -27,6 +28,8 @@ ModelFile readModelFile(const std::string& path, const std::string& description,
 /// If `bytes` are recognised as something other than a network (a Git LFS pointer, HTML, another
 /// format), returns a sentence with the fix. Otherwise returns an empty string.
 std::string whyNoNetwork(std::string_view bytes);
+/// Says what a folder is that was given as a network ("is a network of Core ML; …").
+std::string whyFolderIsNoNetwork(const std::filesystem::path& folder);
 
 /// Returns the description that readModelFile() uses for `path`. Throws StartupError (69) if there
 /// is none.

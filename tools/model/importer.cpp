@@ -58,6 +58,10 @@ int importNetwork(const ImportRequest& request) {
     throw StartupError(ExitCode::kUnavailable,
                        std::string(kPython) + " is missing; apt-get install python3-onnx");
   }
+  if (fs::is_directory(request.network)) {
+    throw StartupError(ExitCode::kUnavailable, "{} {}", request.network.string(),
+                       inference::whyFolderIsNoNetwork(request.network));
+  }
   if (const auto why = inference::whyNoNetwork(textOf(request.network)); !why.empty()) {
     throw StartupError(ExitCode::kData, "{} {}", request.network.string(), why);
   }

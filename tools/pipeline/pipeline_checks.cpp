@@ -124,6 +124,9 @@ void Pipeline::checkDetectionFile() {
         {replay::DataFinding::Grade::kWarning, code, options_.detections + ": " + text});
   };
   if (!detection_file_->note().empty()) warn("boxes_from_one", detection_file_->note());
+  if (const std::string why = detection_file_->whyBeyond(); !why.empty()) {
+    warn("boxes_outside", why);
+  }
   if (const std::size_t beyond = detection_file_->rowsBeyond(last); beyond > 0) {
     warn("boxes_beyond", fmt::format("{} of {} boxes are of frames that this drive ({} … {}) does "
                                      "not have and were left out; see whether they are of it",

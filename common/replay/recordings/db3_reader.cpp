@@ -132,10 +132,10 @@ class Db3 : public RosSource {
     const auto topics = prepared("SELECT id, name, type, serialization_format FROM topics");
     int got = SQLITE_ROW;
     while ((got = sqlite3_step(topics.get())) == SQLITE_ROW) {
-      if (textIn(topics.get(), 3) != "cdr") continue;
-      const std::string name = textIn(topics.get(), 1);
+      const std::string name = textIn(topics.get(), 1), format = textIn(topics.get(), 3);
       names_[sqlite3_column_int64(topics.get(), 0)] = name;
       topics_[name].type = ros::plainName(textIn(topics.get(), 2));
+      if (format != "cdr") topics_[name].type += " in " + format;
     }
     noteEnd(got);
   }

@@ -26,7 +26,8 @@ struct RosMessage {
 };
 
 struct RosTopic {
-  std::string type;  ///< "sensor_msgs/Image", for both ROS versions
+  /// "sensor_msgs/Image", for both ROS versions; "sensor_msgs/Image in json" if it cannot be read
+  std::string type;
   ros::Encoding encoding = ros::Encoding::kCdr;
   std::uint64_t messages = 0;
 };

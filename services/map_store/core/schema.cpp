@@ -37,7 +37,7 @@ CREATE TABLE working(position INTEGER PRIMARY KEY, id INTEGER NOT NULL, belief B
 
 std::string fixOfUse(const Reason& reason) {
   if (reason.code == "disk_full") return "free space, or raise store.max_size.";
-  if (reason.code == "io_error") return "see the disk and the size limit of files (ulimit -f).";
+  if (reason.code == "io_error") return "see the disk.";
   if (reason.code == "busy") return "end the other program that writes it.";
   return "set store.path to a file in a folder that this user may write.";
 }

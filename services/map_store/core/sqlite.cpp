@@ -2,6 +2,8 @@
 
 #include <sqlite3.h>
 
+#include <cerrno>
+#include <cstring>
 #include <string>
 
 #include "common/base/check.h"
@@ -11,8 +13,13 @@ namespace perdure::map_store {
 namespace {
 
 tl::unexpected<Reason> failure(int code, sqlite3* connection) {
-  return tl::unexpected<Reason>(
-      reasonOf(code, connection != nullptr ? sqlite3_errmsg(connection) : sqlite3_errstr(code)));
+  std::string detail = connection != nullptr ? sqlite3_errmsg(connection) : sqlite3_errstr(code);
+  const int cause = connection != nullptr ? sqlite3_system_errno(connection) : 0;
+  if ((code & 0xff) == SQLITE_IOERR && cause != 0) {
+    detail += std::string(": ") + std::strerror(cause);
+    if (cause == EFBIG) detail += " (a limit of this shell, `ulimit -f`, or of the file system)";
+  }
+  return tl::unexpected<Reason>(reasonOf(code, detail));
 }
 
 void mustBind(int code) { check(code == SQLITE_OK, "a value is bound to a parameter that exists"); }
@@ -185,7 +192,7 @@ Result<void> Connection::copyInto(const Connection& target) const {
   const int stepped = sqlite3_backup_step(backup, kAllPages);
   const int finished = sqlite3_backup_finish(backup);
   if (stepped == SQLITE_DONE && finished == SQLITE_OK) return {};
-  return failure(stepped == SQLITE_DONE ? finished : stepped, nullptr);
+  return failure(stepped == SQLITE_DONE ? finished : stepped, to);
 }
 
 Result<Transaction> Transaction::begin(const Connection& connection) {

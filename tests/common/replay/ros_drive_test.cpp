@@ -279,6 +279,17 @@ TEST(RosDrive, WhatIsNoRecordingIsRefusedWithTheFix) {
   EXPECT_THAT(errorOf("d.db3"), HasSubstr("is empty"));
 }
 
+TEST(RosDrive, MessagesInAnotherFormatAreNamed) {
+  const Twin twin = twinOf("ros_json");
+  sqlite3* database = nullptr;
+  ASSERT_EQ(sqlite3_open(twin.file.c_str(), &database), SQLITE_OK);
+  sqlite3_exec(database, "UPDATE topics SET serialization_format = 'json'", nullptr, nullptr,
+               nullptr);
+  sqlite3_close(database);
+  EXPECT_THAT(startupErrorOf([&] { Dataset::open({.path = twin.file, .rig = twin.rig}); }),
+              HasSubstr("Image in json, which is not read"));
+}
+
 RosTopics topicsOfTypes(std::vector<std::pair<const char*, const char*>> list) {
   RosTopics topics;
   for (const auto& [name, type] : list)

@@ -27,6 +27,7 @@ TEST(ModelFile, WhatIsNoNetworkIsNamed) {
       {"\n<!DOCTYPE html><html>", "page in HTML"},
       {"<html lang=en>", "page in HTML"},
       {std::string("\x1c\0\0\0TFL3", 8), "TensorFlow Lite"},
+      {"\x08\x04\x12\x9c\x03\x0a\x0f\x0a\x05image", "Core ML"},
       {"PK\x03\x04 archive/data.pkl", "PyTorch"},
       {"<?xml version='1.0'?><net>", "OpenVINO"},
       {"\x1f\x8b\x08", "compressed"},
@@ -45,6 +46,11 @@ TEST(ModelFile, WhatIsNoNetworkIsNamed) {
   EXPECT_EQ(whyNoNetwork("[net]\nwidth=320\n"), "") << "Darknet";
   EXPECT_EQ(whyNoNetwork("\r\n[net]" + repeated("\r\nwidth=320", 20)), "") << "with CR LF";
   EXPECT_EQ(whyNoNetwork("\x08\x07" + repeated("\r\n\x12", 20) + "\n"), "") << "a lone line feed";
+}
+
+TEST(ModelFile, AFolderIsNamed) {
+  EXPECT_THAT(whyFolderIsNoNetwork("yolo.mlpackage"), HasSubstr("Core ML"));
+  EXPECT_EQ(whyFolderIsNoNetwork("weights"), "is a folder");
 }
 
 TEST(ModelFile, ADamagedNetworkIsRefusedByTheDigestOfItsDescription) {

@@ -373,11 +373,16 @@ TEST(PoseCheck, PartsOfPosesThatStandStillAreNamed) {
   findings = findingsOf(way, poses);
   ASSERT_THAT(codesIn(findings), ElementsAre("poses_frozen"));
   EXPECT_THAT(findings[0].text, HasSubstr("the positions of the poses stand still"));
+  findings = findingsOf(phone(), poses);
+  ASSERT_THAT(codesIn(findings), ElementsAre("poses_frozen")) << "without a speed";
+  EXPECT_THAT(findings[0].text, HasSubstr("m away"));
 }
 
 TEST(PoseCheck, ABodyAtRestMayRepeatItsPose) {
   Way way = curve(0.4);
-  for (std::size_t i = 50; i < 100; ++i) way.poses[i].T_WB = way.poses[50].T_WB;
+  const RigidTransform rest = way.poses[50].T_WB, back = rest * way.poses[99].T_WB.inverse();
+  for (std::size_t i = 50; i < way.poses.size(); ++i)
+    way.poses[i].T_WB = i < 100 ? rest : back * way.poses[i].T_WB;
   for (int i = 0; i < 4000; ++i) {
     ImuSample sample;
     sample.time = TimePoint(durationFromSeconds(100.0 + 0.005 * i));

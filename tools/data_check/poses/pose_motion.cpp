@@ -88,6 +88,19 @@ std::string movingIn(const replay::Recording& recording, TimePoint from, TimePoi
   return flows ? "the images move" : "";
 }
 
+/// What the positions do after they were still, if they make up for it at once; else nothing.
+std::string catchingUp(const Poses& poses, const Still& still) {
+  constexpr double kMoves_mps = 0.5, kTimes = 3.0;
+  if (still.last + 2 >= poses.size()) return {};
+  const StampedPose &from = poses[still.last], &to = poses[still.last + 1],
+                    &next = poses[still.last + 2];
+  const double step = (to.T_WB.p - from.T_WB.p).norm();
+  const double speed = (next.T_WB.p - to.T_WB.p).norm() / toSeconds(next.time - to.time);
+  const bool fast = step > kMoves_mps * toSeconds(from.time - poses[still.first].time);
+  if (!fast || step < kTimes * speed * toSeconds(to.time - from.time)) return {};
+  return fmt::format("and go on {:.2g} m away", step);
+}
+
 }  // namespace
 
 DataFindings judgePosesOfCamera(const Poses& poses, const replay::Recording& recording) {
@@ -136,11 +149,16 @@ DataFindings judgePosesFrozen(const Poses& poses, const replay::Recording& recor
     const bool at_end = still->first == 0 || still->last + 1 == poses.size();
     if (at_end && are_same != areSamePoses) continue;
     const TimePoint from = poses[still->first].time, to = poses[still->last].time;
-    const std::string moves = movingIn(recording, from, to, are_same, images);
+    std::string moves = movingIn(recording, from, to, are_same, images);
+    if (!moves.empty()) {
+      moves = "while " + moves;
+    } else if (are_same == areSamePlaces) {
+      moves = catchingUp(poses, *still);
+    }
     if (moves.empty()) continue;
     return {{Grade::kWarning, "poses_frozen",
-             fmt::format("the {} still from {} to {} ns ({:.1f} s, poses {} to {} of them) while "
-                         "{}: a tracker that is lost repeats its last pose; leave those lines out",
+             fmt::format("the {} still from {} to {} ns ({:.1f} s, poses {} to {} of them) {}: "
+                         "a tracker that is lost repeats its last pose; leave those lines out",
                          what, toNanoseconds(from), toNanoseconds(to), toSeconds(to - from),
                          still->first + 1, still->last + 1, moves)}};
   }

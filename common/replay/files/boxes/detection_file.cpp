@@ -349,6 +349,26 @@ std::string DetectionFile::whyOutside() const {
       thousandths ? ", or thousandths of the image" : "");
 }
 
+std::string DetectionFile::whyBeyond() const {
+  constexpr double kReach = 0.02;  // share of the image; boxes of detectors reach out by less
+  double right = 0.0, bottom = 0.0;
+  std::size_t beyond = 0, before = 0;
+  const double across = kReach * options_.width, down = kReach * options_.height;
+  for (const auto& [frame, rows] : rows_) {
+    for (const Row& row : rows) {
+      const Box& box = row.detection.box;
+      right = std::max(right, box.x2), bottom = std::max(bottom, box.y2);
+      beyond += box.x2 > options_.width + across || box.y2 > options_.height + down ? 1 : 0;
+      before += box.x1 < -across || box.y1 < -down ? 1 : 0;
+    }
+  }
+  if (options_.width == 0.0 || 20 * beyond <= rows() || 10 * before > beyond) return {};
+  return fmt::format(
+      "{} of {} boxes reach beyond the right or lower border of the images ({}x{}), to {:.0f}, "
+      "{:.0f}, and {} beyond the left or upper one: they may be of images of another size",
+      beyond, rows(), options_.width, options_.height, right, bottom, before);
+}
+
 bool DetectionFile::hasSizes() const {
   constexpr std::size_t kLeast = 20;
   constexpr double kBorder = 2.0;  // px; boxes that the border cuts off end this close to it

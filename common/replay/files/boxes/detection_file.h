@@ -65,6 +65,9 @@ class DetectionFile {
   bool hasSizes() const;
   /// A sentence if many boxes lie outside the images. Otherwise "".
   std::string whyOutside() const;
+  /// A sentence if boxes reach beyond the image on one side of it only, as those of larger images
+  /// do. Otherwise "".
+  std::string whyBeyond() const;
 
   struct Row {
     Detection detection;     ///< empty until at() sets the activations, if the file has no logits

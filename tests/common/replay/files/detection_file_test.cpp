@@ -301,6 +301,10 @@ TEST(DetectionFile, SharesOfTheImageAndSizesAreRecognised) {
       readCsv(header + "0,car,300,400,450,700,.9\n", options).whyOutside(),
       HasSubstr("(320x240); boxes reach to 450, 700: they are of images of another size, or "
                 "thousandths of the image"));
+  EXPECT_THAT(readCsv(header + "0,car,100,90,350,200,.9\n", options).whyBeyond(),
+              HasSubstr("1 of 1 boxes reach beyond the right"));
+  const std::string whole = header + "0,car,100,90,350,200,.9\n1,car,-40,90,90,200,.9\n";
+  EXPECT_EQ(readCsv(whole, options).whyBeyond(), "") << "boxes of whole objects reach out on both";
 }
 
 TEST(DetectionFile, EveryWrongLineIsLocated) {
