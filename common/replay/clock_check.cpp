@@ -303,6 +303,13 @@ DataFinding findingOf(const ClockChange& first, std::size_t count, const std::st
                         "stamps continue from there",
                         places, sensor, step, first.counter)};
   }
+  if (first.kind == Kind::kDigits) {
+    return {Grade::kFatal, "stamps_are_digits",
+            fmt::format("{}: the stamps of {} {} by {} at a full minute: they are the digits of a "
+                        "time of day (HHMMSS); convert them to a time that increases evenly, "
+                        "3600 HH + 60 MM + SS",
+                        places, sensor, back ? "go back" : "jump ahead", step)};
+  }
   if (first.kind == Kind::kPause) {
     return {Grade::kWarning, "clock_paused",
             fmt::format("{}: no data of {} for {}: the recording paused, or its clock was set "

@@ -124,6 +124,7 @@ replay::DataFindings checkPoses(const replay::Recording& recording, const replay
   }
   if (!findings.empty()) return findings;  // accelerations would fail too
   findings = judgePoseMoving(poses, recording);
+  if (findings.empty()) findings = judgePosesByPushes(poses, recording);
   if (findings.empty()) findings = judgePoseAxes(poses, recording);
   if (findings.empty()) findings = judgePoseUnit(poses, recording);
   return findings;

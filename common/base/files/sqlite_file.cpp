@@ -4,6 +4,8 @@
 #include <sqlite3.h>
 
 #include <array>
+#include <cerrno>
+#include <cstring>
 #include <fstream>
 
 #include "common/base/files/access.h"
@@ -40,7 +42,7 @@ bool holds(const fs::path& file, const char* suffix) {
   return !missing && size > 0;
 }
 
-std::string whyNot(const fs::path& file, int code, const char* of_sqlite) {
+std::string whyNot(const fs::path& file, int code, const std::string& of_sqlite) {
   if (std::string why = whyUnreadable(file); !why.empty()) return why;
   const int kind = code & 0xff;
   if (kind == SQLITE_BUSY || kind == SQLITE_LOCKED) {
@@ -67,16 +69,27 @@ fs::path targetOf(const fs::path& link) {
 
 }  // namespace
 
+std::string sqliteError(sqlite3* connection, int code) {
+  std::string text = connection != nullptr ? sqlite3_errmsg(connection) : sqlite3_errstr(code);
+  const int cause = connection != nullptr ? sqlite3_system_errno(connection) : 0;
+  if ((code & 0xff) != SQLITE_IOERR || cause == 0) return text;
+  text += std::string(": ") + std::strerror(cause);
+  if (cause == EFBIG) text += " (a limit of this shell, `ulimit -f`, or of the file system)";
+  return text;
+}
+
 OpenedSqlite openSqliteToRead(const fs::path& link) {
   const fs::path file = targetOf(link);
   OpenedSqlite opened;
   opened.code = openAs(addressOf(file, ""), opened.connection);
   const int kind = opened.code & 0xff;
-  const bool wants_to_write = kind == SQLITE_READONLY || kind == SQLITE_CANTOPEN;
+  const bool wants_to_write =
+      kind == SQLITE_READONLY || kind == SQLITE_CANTOPEN || kind == SQLITE_IOERR;
   if (wants_to_write && !holds(file, "-wal") && !holds(file, "-journal")) {
     opened.code = openAs(addressOf(file, "?immutable=1"), opened.connection);
   }
-  if (opened.code != 0) opened.why = whyNot(file, opened.code, sqlite3_errmsg(opened.connection));
+  if (opened.code != 0)
+    opened.why = whyNot(file, opened.code, sqliteError(opened.connection, opened.code));
   return opened;
 }
 

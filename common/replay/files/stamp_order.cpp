@@ -51,6 +51,17 @@ std::vector<Counter> counters() {
   return all;
 }
 
+/// Reads the digits HHMMSS of a time of day, whose last digit counts `second`, with its fraction;
+/// nothing if they are none.
+std::optional<Duration> timeOfDay(TimePoint stamp, Duration second) {
+  const Duration all = stamp.time_since_epoch();
+  if (all < Duration{0}) return std::nullopt;
+  const auto digits = all / second;
+  const auto h = digits / 10'000 % 100, m = digits / 100 % 100, s = digits % 100;
+  if (h >= 24 || m >= 60 || s >= 60) return std::nullopt;
+  return second * (3600 * h + 60 * m + s) + all % second;
+}
+
 /// Indices of a longest subsequence of stamps that do not decrease.
 std::vector<std::size_t> longestInOrder(const Times& stamps) {
   std::vector<std::size_t> ends,
@@ -209,9 +220,14 @@ class ClockWalk {
       change.kind = Kind::kSet, change.added = set->added;
       return change;
     }
+    if (step >= Duration{0} && step <= multipleOf(3, usual_)) return std::nullopt;
+    const bool regular = i > kFew && goesOn(i - kFew - 1, kFew + 1) && goesOn(i, kFew + 1);
+    if (regular && areDigits(change)) {
+      change.kind = Kind::kDigits, change.common = true;
+      return change;
+    }
     if (step >= Duration{0} && step <= pause) return std::nullopt;
     const std::size_t behind = std::min(kFew + 1, stamps_.size() - i);
-    const bool regular = i > kFew && goesOn(i - kFew - 1, kFew + 1) && goesOn(i, kFew + 1);
     if (step < Duration{0} && goesOn(i, behind) && findCounter(change, regular)) return change;
     if (!regular || kOrdered * back_ > stamps_.size()) return std::nullopt;
     // a step forward of up to a day is a pause
@@ -219,6 +235,18 @@ class ClockWalk {
     if (step < Duration{0} && (isSwap(i) || isMoved(i))) return std::nullopt;
     change.kind = Kind::kSet, change.added = between(TimePoint(usual_), TimePoint(step));
     return change;
+  }
+
+  /// Returns whether the stamps pass a full minute as digits of a time of day do, in ns, µs or ms.
+  bool areDigits(const ClockChange& change) const {
+    for (const Duration second : {Duration(1'000'000'000), Duration(1'000'000), Duration(1000)}) {
+      const auto before = timeOfDay(change.before, second), after = timeOfDay(change.after, second);
+      const Duration minute = second * 60, day = minute * 60 * 24;
+      if (!before || !after || *after % minute > *before % minute) continue;
+      const Duration step = (*after - *before + day) % day;
+      if (step > Duration{0} && step <= std::max(second / 4, multipleOf(3, usual_))) return true;
+    }
+    return false;
   }
 
   /// Returns the change of another sensor's clock if it explains the step here.

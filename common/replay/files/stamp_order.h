@@ -17,7 +17,8 @@ struct ClockChange {
   enum class Kind {
     kCounter,  ///< a counter wrapped: `added` continues it exactly
     kSet,      ///< the clock was set: `added` continues it after a usual interval
-    kPause     ///< a pause, or a clock that was set forward; nothing is added
+    kPause,    ///< a pause, or a clock that was set forward; nothing is added
+    kDigits    ///< stamps are the digits of a time of day (HHMMSS); nothing is added
   };
   Kind kind = Kind::kPause;
   /// Index of the first stamp after the change, in the order of the file.
@@ -29,7 +30,7 @@ struct ClockChange {
   std::string sensor = {};   ///< "imu", "accel", "frame", "stereo", "speed", "truth"
   std::string place = {};    ///< "FILE:LINE", or the number of the message
   TimePoint continues = {};  ///< `after` in the corrected time
-  bool common = false;       ///< kSet: the clocks of all sensors were set by the same amount
+  bool common = false;       ///< the clocks of all sensors were set by the same amount; kDigits
 };
 
 /// The stamps to keep, as indices in increasing order of their corrected times.

@@ -2,8 +2,6 @@
 
 #include <sqlite3.h>
 
-#include <cerrno>
-#include <cstring>
 #include <string>
 
 #include "common/base/check.h"
@@ -13,13 +11,7 @@ namespace perdure::map_store {
 namespace {
 
 tl::unexpected<Reason> failure(int code, sqlite3* connection) {
-  std::string detail = connection != nullptr ? sqlite3_errmsg(connection) : sqlite3_errstr(code);
-  const int cause = connection != nullptr ? sqlite3_system_errno(connection) : 0;
-  if ((code & 0xff) == SQLITE_IOERR && cause != 0) {
-    detail += std::string(": ") + std::strerror(cause);
-    if (cause == EFBIG) detail += " (a limit of this shell, `ulimit -f`, or of the file system)";
-  }
-  return tl::unexpected<Reason>(reasonOf(code, detail));
+  return tl::unexpected<Reason>(reasonOf(code, sqliteError(connection, code)));
 }
 
 void mustBind(int code) { check(code == SQLITE_OK, "a value is bound to a parameter that exists"); }

@@ -212,7 +212,9 @@ TEST_F(MapCopy, SaysWhereItCannotBeWrittenAndLeavesNoPart) {
     try {
       copyMap(from_, to_);
     } catch (const StartupError& error) {
-      const bool says = std::string(error.what()).find(to_ + " cannot be written") == 8;
+      const std::string text = error.what();
+      const bool says = text.find(to_ + " cannot be written") == 8 &&
+                        text.find("ulimit -f") != std::string::npos;
       _exit(error.code() == ExitCode::kInputOutput && says ? 0 : 3);
     }
     _exit(1);
@@ -221,6 +223,24 @@ TEST_F(MapCopy, SaysWhereItCannotBeWrittenAndLeavesNoPart) {
   waitpid(child, &status, 0);
   EXPECT_EQ(status, 0);
   EXPECT_TRUE(nothingThere());
+}
+
+TEST_F(MapCopy, AMapIsReadUnderASizeLimitOfFiles) {
+  {
+    MapDatabase database({from_});
+    write(database, 3);
+  }
+  const pid_t child = fork();
+  if (child == 0) {  // SQLite would make a file of 32 KiB beside the map
+    signal(SIGXFSZ, SIG_IGN);
+    const rlimit small{8'000, 8'000};
+    if (setrlimit(RLIMIT_FSIZE, &small) != 0) _exit(2);
+    const auto opened = openSqliteToRead(from_);
+    _exit(opened.code == 0 ? 0 : 3);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  EXPECT_EQ(status, 0);
 }
 
 }  // namespace

@@ -413,6 +413,18 @@ TEST(PoseCheck, AnOffsetAtTheEndOfTheSearchIsReportedAsALowerLimit) {
   EXPECT_THAT(findings[0].text, HasSubstr("of the poses and check again"));
 }
 
+TEST(PoseCheck, PosesOnAnotherClockAreFoundByTheAccelerometerIfNothingTurns) {
+  const Way straight = wayOf(Eigen::Vector3d::Zero());
+  EXPECT_THAT(codesIn(findingsOf(straight, straight.poses)), ElementsAre());
+  for (const int late_ms : {400, -700}) {
+    Poses poses = straight.poses;
+    for (auto& pose : poses) pose.time += std::chrono::milliseconds(late_ms);
+    const auto findings = findingsOf(straight, poses);
+    ASSERT_THAT(codesIn(findings), ElementsAre("poses_time_offset"));
+    EXPECT_THAT(findings[0].text, HasSubstr(late_ms > 0 ? "subtract 0.40 s" : "add 0.70 s"));
+  }
+}
+
 TEST(PoseCheck, PosesOnAnotherClockAreToldByTheGyroscope) {
   Poses late = phone().poses;
   for (auto& pose : late) pose.time += std::chrono::milliseconds(400);

@@ -296,6 +296,17 @@ std::optional<DataFinding> nothingInCommon(const std::vector<Step>& steps, const
 
 }  // namespace
 
+DataFinding posesAtOtherTimes(const std::string& what, double later_s, bool may_be_more) {
+  const bool early = later_s < 0.0;
+  const double seconds = std::abs(later_s);
+  return {Grade::kWarning, "poses_time_offset",
+          fmt::format("{} {}{:.2f} s {} the poses that are given: {} {:.2f} s {} the times of the "
+                      "poses{}, or see which frame each of them is of",
+                      what, may_be_more ? "at least " : "", seconds, early ? "before" : "after",
+                      early ? "subtract" : "add", seconds, early ? "from" : "to",
+                      may_be_more ? " and check again" : "")};
+}
+
 std::vector<StampedPose> timedPoses(const replay::PoseFile& file,
                                     const replay::Recording& recording) {
   if (file.format() == replay::PoseFormat::kTum) return file.poses();
@@ -340,14 +351,7 @@ DataFindings judgePosesByGyro(const std::vector<StampedPose>& poses,
   }
   if (const auto later = betterTime(poses, gyro, camera, kLimits)) {
     if (std::abs(*later) < 0.1) return {};
-    const bool may_be_more = std::abs(*later) >= kMostLater_s;
-    return {{Grade::kWarning, "poses_time_offset",
-             fmt::format(
-                 "the gyroscope turns {}{:.2f} s {} the poses that are given: {} {:.2f} s {} "
-                 "the times of the poses{}, or see which frame each of them is of",
-                 may_be_more ? "at least " : "", std::abs(*later), *later < 0 ? "before" : "after",
-                 *later < 0 ? "subtract" : "add", std::abs(*later), *later < 0 ? "from" : "to",
-                 may_be_more ? " and check again" : "")}};
+    return {posesAtOtherTimes("the gyroscope turns", *later, std::abs(*later) >= kMostLater_s)};
   }
   for (const auto& steps : all) {
     if (auto finding = otherAxes(steps, q_BC, kLimits, kGyro)) return {*finding};

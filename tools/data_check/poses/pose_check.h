@@ -34,6 +34,15 @@ enum class Inversion { kUnsure, kPose, kQuaternion };
 Inversion howInverted(const std::vector<replay::StampedPose>& poses,
                       const replay::Recording& recording, bool of_camera);
 
+/// The finding for poses whose times are `later_s` before those of a sensor. `what` names its
+/// motion, as "the gyroscope turns". Code: poses_time_offset.
+replay::DataFinding posesAtOtherTimes(const std::string& what, double later_s, bool may_be_more);
+
+/// Finds poses whose accelerations agree with the accelerometer only at other times, on drives that
+/// are too straight for the gyroscope. Code: poses_time_offset.
+replay::DataFindings judgePosesByPushes(const std::vector<replay::StampedPose>& poses,
+                                        const replay::Recording& recording);
+
 /// Finds constant orientations although the gyroscope rotates. Code: poses_without_turning.
 replay::DataFindings judgePoseTurning(const std::vector<replay::StampedPose>& poses,
                                       const std::vector<Eigen::Vector3d>& gyro_turns);

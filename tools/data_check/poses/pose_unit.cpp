@@ -71,7 +71,37 @@ DataFindings judgeSpeed(const std::vector<StampedPose>& poses) {
                    median, speeds.size())}};
 }
 
+/// The shared fraction of the accelerations if the poses' times are increased by `later`.
+double commonAt(std::vector<StampedPose> poses, const replay::Recording& recording,
+                const TurnIntegral& gyro, double seconds, Duration later) {
+  for (StampedPose& pose : poses) pose.time += later;
+  const auto scale = scaleOf(pushesOf(poses, recording, gyro, seconds));
+  return scale ? scale->common : 0.0;
+}
+
 }  // namespace
+
+DataFindings judgePosesByPushes(const std::vector<StampedPose>& poses,
+                                const replay::Recording& recording) {
+  constexpr double kStep_s = 0.3, kSound = 0.75, kExplained = 0.85, kClearly = 3.0;
+  constexpr Duration kEach = std::chrono::milliseconds(50), kMost = std::chrono::seconds(2),
+                     kShown = std::chrono::milliseconds(100);
+  if (!measuresGravity(recording.imu) || recording.calibration.cameras.empty()) return {};
+  const TurnIntegral gyro(recording.imu);
+  const auto leftAt = [&](Duration later) {
+    return 1.0 - commonAt(poses, recording, gyro, kStep_s, later);
+  };
+  const double now = leftAt(Duration{0});
+  if (now < 1.0 - kSound) return {};
+  double least = std::min(1.0 - kExplained, now / kClearly);
+  Duration best{0};
+  for (Duration later = -kMost; later <= kMost; later += kEach) {
+    if (const double left = leftAt(later); left < least) least = left, best = later;
+  }
+  if (std::chrono::abs(best) < kShown) return {};
+  return {posesAtOtherTimes("by the accelerometer the body speeds up", toSeconds(best),
+                            std::chrono::abs(best) >= kMost)};
+}
 
 DataFindings judgePoseUnit(const std::vector<StampedPose>& poses,
                            const replay::Recording& recording) {

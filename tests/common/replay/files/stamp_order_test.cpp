@@ -163,6 +163,20 @@ TEST(Clocks, ACounterThatCameRoundGoesOn) {
   }
 }
 
+TEST(Clocks, DigitsOfATimeOfDayAreRecognisedAtAFullMinute) {
+  for (const int start_s : {45'058, 3'598, 86'398}) {
+    for (const std::int64_t scale : {1, 1000, 1'000'000}) {
+      const auto order = orderWritten(300, [&](Duration time) {
+        const Duration day = seconds(start_s) + time;
+        const auto s = day / seconds(1) % 86'400;
+        return (seconds(s / 3600 * 10'000 + s / 60 % 60 * 100 + s % 60) + day % seconds(1)) / scale;
+      });
+      ASSERT_EQ(order.changes.size(), 1U) << start_s << " " << scale;
+      EXPECT_EQ(order.changes[0].kind, Kind::kDigits);
+    }
+  }
+}
+
 TEST(Clocks, ACounterMayComeRoundOftenAndFromAnyStart) {
   const Duration length(std::int64_t{1000} << 16);  // 65.5 ms
   expectRegular(orderWritten(100, [&](Duration time) { return time % length; }), 100);
