@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "common/base/errors.h"
+#include "common/base/files/sqlite_file.h"
 #include "services/map_store/core/map_database.h"
 #include "tests/services/map_store/beliefs.h"
 #include "tests/services/map_store/graphs.h"
