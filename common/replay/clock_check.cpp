@@ -447,6 +447,8 @@ std::string causeOfShift(double seconds) {
 DataFindings checkClocks(const Recording& recording, const DataUse& use) {
   DataFindings findings;
   checkClockChanges(recording, use, findings);
+  const auto isDigits = [](const auto& one) { return one.code == "stamps_are_digits"; };
+  if (std::ranges::any_of(findings, isDigits)) return findings;  // rates and units would be wrong
   const bool of_imu = use.imu && !recording.imu.empty();
   const StampList imu = of_imu ? stampsOfImu(recording) : StampList(),
                   images = stampsOfCamera(recording);
@@ -458,6 +460,9 @@ DataFindings checkClocks(const Recording& recording, const DataUse& use) {
   if (factor == 1) {  // excludes 1 kHz samples in whole ms, which increase by 1 as counts do
     checkCount("images", images, findings);
     checkCount("samples of the IMU", imu, findings);
+  } else if (const auto why = whyDateDigits(std::to_string(toNanoseconds(images.front())));
+             !why.empty()) {
+    findings.push_back({StampGrade::kFatal, "stamps_are_digits", "the first stamp, " + why});
   } else {
     findings.push_back(
         {StampGrade::kFatal, "stamps_unit",

@@ -356,6 +356,11 @@ class RosDriveReader {
     for (std::size_t i = 0; i < cameras_.size(); ++i)
       said += "cam" + std::to_string(i) + " is " + cameras_[i].topics.image + ", ";
     said += imu_.empty() ? "and there is no inertial unit" : "the inertial unit is " + imu_;
+    for (const auto& [name, topic] : messages_.topics()) {
+      if (imu_.empty() && topic.type.starts_with("sensor_msgs/Imu in ")) {
+        said += "; those on " + name + " are " + topic.type + ", which is not read";
+      }
+    }
     recording_.notes.push_back(said);
   }
 

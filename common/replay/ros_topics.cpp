@@ -115,8 +115,7 @@ class Choice {
     if (all.empty()) {
       const auto depth = ofTypes(topics_, {kImage, kCompressed});
       stop(depth.empty()
-               ? "holds no images (sensor_msgs/Image or CompressedImage)" + imagesOfOthers() +
-                     "; record them too"
+               ? "holds no images (sensor_msgs/Image or CompressedImage)" + imagesOfOthers()
                : "holds depth alone (" + listOf(depth) + "); record a camera's images too");
     }
     if (all.size() == 1) return all;
@@ -136,7 +135,7 @@ class Choice {
       if (!ours && topic.messages > 0 && topic.type.find("Image") != std::string::npos)
         return "; those on " + name + " are " + topic.type + ", which is not read";
     }
-    return "";
+    return "; record them too";
   }
 
   CameraTopics cameraOf(const std::string& stream) const {

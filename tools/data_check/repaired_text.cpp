@@ -140,6 +140,9 @@ bool repairStamps(Table& table, const WholeUnit& whole, std::vector<std::string>
   std::size_t places = placesShort(table);
   if (places == 0 && isOf(whole, table)) places = whole.places;
   if (places == 0) return false;
+  if (const auto why = replay::whyDateDigits(table.rows.front()[0]); !why.empty()) {
+    throw StartupError(ExitCode::kData, "{}: the first stamp, {}", table.file.string(), why);
+  }
   const char* unit = places == 9 ? "seconds" : places == 6 ? "milliseconds" : "microseconds";
   for (auto& row : table.rows) {
     auto stamp = shifted(row[0], places);

@@ -62,7 +62,12 @@ int importNetwork(const ImportRequest& request) {
     throw StartupError(ExitCode::kUnavailable, "{} {}", request.network.string(),
                        inference::whyFolderIsNoNetwork(request.network));
   }
-  if (const auto why = inference::whyNoNetwork(textOf(request.network)); !why.empty()) {
+  const std::string bytes = textOf(request.network);
+  if (bytes.empty()) {
+    throw StartupError(ExitCode::kData, "{} is empty, 0 bytes; fetch it again",
+                       request.network.string());
+  }
+  if (const auto why = inference::whyNoNetwork(bytes); !why.empty()) {
     throw StartupError(ExitCode::kData, "{} {}", request.network.string(), why);
   }
   Subprocess python({.command = words, .environment = {{"PYTHONPATH", folder->string()}}});

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "common/base/checked_file.h"
 #include "common/base/errors.h"
 
 namespace perdure::tools {
@@ -60,16 +61,13 @@ Journal::Journal(const std::filesystem::path& file, std::size_t cameras,
   stream_.open(file_, std::ios::trunc);
   for (const auto& entry : entries_) stream_ << lineOf(entry) << '\n';
   stream_.flush();
-  if (!stream_) {
-    throw StartupError(ExitCode::kUnavailable,
-                       file_.string() + " cannot be written; is the disk full or read-only?");
-  }
+  if (!stream_) throwUnwritten(file_);
 }
 
 void Journal::append(const JournalEntry& entry) {
   entries_.push_back(entry);
   stream_ << lineOf(entry) << '\n' << std::flush;
-  if (!stream_) throw std::runtime_error(file_.string() + " cannot be written; is the disk full?");
+  if (!stream_) throwUnwritten(file_);
 }
 
 }  // namespace perdure::tools

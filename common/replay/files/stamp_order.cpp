@@ -240,6 +240,8 @@ class ClockWalk {
   /// Returns whether the stamps pass a full minute as digits of a time of day do, in ns, µs or ms.
   bool areDigits(const ClockChange& change) const {
     for (const Duration second : {Duration(1'000'000'000), Duration(1'000'000), Duration(1000)}) {
+      // 0.5 to 2000 samples a second; other units are wrong
+      if (usual_ > 2 * second || multipleOf(2000, usual_) < second) continue;
       const auto before = timeOfDay(change.before, second), after = timeOfDay(change.after, second);
       const Duration minute = second * 60, day = minute * 60 * 24;
       if (!before || !after || *after % minute > *before % minute) continue;

@@ -71,9 +71,29 @@ std::optional<TimePoint> parseSeconds(std::string_view text) {
   return TimePoint(durationFromSeconds(*seconds));
 }
 
+std::string whyDateDigits(std::string_view text) {
+  text = trim(text);
+  const bool whole_year = text.size() == 17 || text.size() == 20 || text.size() == 23;
+  const bool short_year = text.size() == 15 || text.size() == 18 || text.size() == 21;
+  const bool digits = std::ranges::all_of(text, [](char c) { return c >= '0' && c <= '9'; });
+  if (!digits || !(whole_year || short_year)) return {};
+  if (whole_year && !text.starts_with("19") && !text.starts_with("20")) return {};
+  const std::string_view rest = text.substr(whole_year ? 4 : 2);  // MMDDHHMMSS…
+  const auto isWithin = [&](std::size_t pair, std::int64_t least, std::int64_t most) {
+    const auto value = parseInteger(rest.substr(2 * pair, 2));
+    return value && *value >= least && *value <= most;
+  };
+  const bool date = isWithin(0, 1, 12) && isWithin(1, 1, 31);
+  if (!date || !isWithin(2, 0, 23) || !isWithin(3, 0, 59) || !isWithin(4, 0, 59)) return {};
+  return "`" + std::string(text) +
+         "` has the digits of a date and a time of day; convert the stamps to nanoseconds since "
+         "1970";
+}
+
 std::string whyNoStamp(std::string_view text) {
   text = trim(text);
   if (parseNanoseconds(text)) return {};
+  if (std::string why = whyDateDigits(text); !why.empty()) return why;
   std::string why = "`" + std::string(text) + "` is no stamp in whole nanoseconds";
   if (text.find(';') != text.npos) {
     return why +

@@ -22,6 +22,11 @@ std::optional<TimePoint> parseSeconds(std::string_view text);
 /// Returns the reason and the fix if parseNanoseconds() returns nothing. Otherwise returns "".
 std::string whyNoStamp(std::string_view text);
 
+/// Returns the reason and the fix if the text has the digits of a date and a time of day with a
+/// fraction (YYYYMMDDHHMMSSmmm, YYMMDDHHMMSSmmm, or with more decimals). Otherwise returns "". Some
+/// stamps in nanoseconds have such digits, too.
+std::string whyDateDigits(std::string_view text);
+
 /// a − b, limited to ±292 years, because a file may contain any stamps.
 Duration between(TimePoint a, TimePoint b);
 /// n · d, limited to ±292 years.

@@ -135,7 +135,7 @@ class Db3 : public RosSource {
       const std::string name = textIn(topics.get(), 1), format = textIn(topics.get(), 3);
       names_[sqlite3_column_int64(topics.get(), 0)] = name;
       topics_[name].type = ros::plainName(textIn(topics.get(), 2));
-      if (format != "cdr") topics_[name].type += " in " + format;
+      if (format != "cdr") topics_[name].type += " in " + (format.empty() ? "no format" : format);
     }
     noteEnd(got);
   }

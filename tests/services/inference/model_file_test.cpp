@@ -27,7 +27,13 @@ TEST(ModelFile, WhatIsNoNetworkIsNamed) {
       {"\n<!DOCTYPE html><html>", "page in HTML"},
       {"<html lang=en>", "page in HTML"},
       {std::string("\x1c\0\0\0TFL3", 8), "TensorFlow Lite"},
-      {"\x08\x04\x12\x9c\x03\x0a\x0f\x0a\x05image", "Core ML"},
+      {"\x08\x04\x12\x1c\x0a\x0f\x0a\x05image" + std::string(400, 'm'), "Core ML"},
+      {"\x08\x09\x12\x1c\xa2\x01\x0f" + std::string(400, 'm'), "Core ML"},
+      {"\x08\x01\x12\x9c\x03\x0a\x0f\x0a\x05serve" + std::string(400, 'm'), "SavedModel"},
+      {std::string("\x20\x01\0\0{\"version\"", 13), "TensorRT"},
+      {std::string("\x1c\0\0\0ORTM", 8), ".ort"},
+      {std::string("\x80\x02}q\0", 5), "pickle"},
+      {"\n\x07yolo-v3\x1a", "Caffe"},
       {"PK\x03\x04 archive/data.pkl", "PyTorch"},
       {"<?xml version='1.0'?><net>", "OpenVINO"},
       {"\x1f\x8b\x08", "compressed"},
@@ -43,6 +49,7 @@ TEST(ModelFile, WhatIsNoNetworkIsNamed) {
   for (const auto& [bytes, words] : cases) EXPECT_THAT(whyNoNetwork(bytes), HasSubstr(words));
   EXPECT_EQ(whyNoNetwork(""), "");
   EXPECT_EQ(whyNoNetwork("\x08\x07\x12\x07pytorch"), "") << "ONNX";
+  EXPECT_EQ(whyNoNetwork("\x08\x07\x12\x08Roboflow"), "") << "ONNX";
   EXPECT_EQ(whyNoNetwork("[net]\nwidth=320\n"), "") << "Darknet";
   EXPECT_EQ(whyNoNetwork("\r\n[net]" + repeated("\r\nwidth=320", 20)), "") << "with CR LF";
   EXPECT_EQ(whyNoNetwork("\x08\x07" + repeated("\r\n\x12", 20) + "\n"), "") << "a lone line feed";
@@ -50,7 +57,7 @@ TEST(ModelFile, WhatIsNoNetworkIsNamed) {
 
 TEST(ModelFile, AFolderIsNamed) {
   EXPECT_THAT(whyFolderIsNoNetwork("yolo.mlpackage"), HasSubstr("Core ML"));
-  EXPECT_EQ(whyFolderIsNoNetwork("weights"), "is a folder");
+  EXPECT_THAT(whyFolderIsNoNetwork("weights"), HasSubstr("is a folder"));
 }
 
 TEST(ModelFile, ADamagedNetworkIsRefusedByTheDigestOfItsDescription) {

@@ -376,6 +376,14 @@ TEST(PoseCheck, PartsOfPosesThatStandStillAreNamed) {
   findings = findingsOf(phone(), poses);
   ASSERT_THAT(codesIn(findings), ElementsAre("poses_frozen")) << "without a speed";
   EXPECT_THAT(findings[0].text, HasSubstr("m away"));
+  // A tracker that lost the way goes on from its last position.
+  poses = sound;
+  const Eigen::Vector3d lost = sound[184].T_WB.p - sound[168].T_WB.p;
+  for (std::size_t i = 168; i < poses.size(); ++i)
+    poses[i].T_WB.p = i < 184 ? sound[168].T_WB.p : Eigen::Vector3d(sound[i].T_WB.p - lost);
+  findings = findingsOf(phone(), poses);
+  ASSERT_THAT(codesIn(findings), ElementsAre("poses_frozen"));
+  EXPECT_THAT(findings[0].text, HasSubstr("without braking"));
 }
 
 TEST(PoseCheck, ABodyAtRestMayRepeatItsPose) {

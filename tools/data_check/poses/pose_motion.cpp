@@ -57,20 +57,23 @@ bool areSamePoses(const RigidTransform& a, const RigidTransform& b) {
   return areSamePlaces(a, b) && areSameTurns(a, b);
 }
 
-/// The longest interval, over 0.4 s but not the whole drive, in which poses are the same.
-std::optional<Still> longestStill(const Poses& poses, AreSame are_same) {
+/// The intervals of 0.4 s or more, but not the whole drive, in which poses are the same; the
+/// longest first.
+std::vector<Still> stillParts(const Poses& poses, AreSame are_same) {
   constexpr Duration kLeast = std::chrono::milliseconds(400);
-  constexpr std::size_t kFewest = 5;
-  std::optional<Still> longest;
-  Duration most = kLeast;
-  for (std::size_t i = 0, from = 0; i < poses.size(); ++i) {
-    if (!are_same(poses[from].T_WB, poses[i].T_WB)) from = i;
-    if (poses[i].time - poses[from].time < most || i - from < kFewest) continue;
-    most = poses[i].time - poses[from].time;
-    longest = Still{from, i};
+  constexpr std::size_t kFewest = 3;
+  std::vector<Still> parts;
+  for (std::size_t from = 0, to = 0; from < poses.size(); from = to + 1) {
+    to = from;
+    while (to + 1 < poses.size() && are_same(poses[from].T_WB, poses[to + 1].T_WB)) ++to;
+    const bool whole = from == 0 && to + 1 == poses.size();
+    if (whole || to - from < kFewest || poses[to].time - poses[from].time < kLeast) continue;
+    parts.push_back({from, to});
   }
-  if (longest && longest->first == 0 && longest->last + 1 == poses.size()) return std::nullopt;
-  return longest;
+  std::stable_sort(parts.begin(), parts.end(), [&](const Still& a, const Still& b) {
+    return poses[a.last].time - poses[a.first].time > poses[b.last].time - poses[b.first].time;
+  });
+  return parts;
 }
 
 /// What moves while the poses are still: the gyroscope, the speed or the images; else nothing.
@@ -99,6 +102,51 @@ std::string catchingUp(const Poses& poses, const Still& still) {
   const bool fast = step > kMoves_mps * toSeconds(from.time - poses[still.first].time);
   if (!fast || step < kTimes * speed * toSeconds(to.time - from.time)) return {};
   return fmt::format("and go on {:.2g} m away", step);
+}
+
+/// The speed beside a still part, if it stops or starts harder than any body does; else 0. `end` is
+/// the first or last pose of the part, `step` leads out of it.
+double speedAtOnce(const Poses& poses, std::size_t end, std::ptrdiff_t step) {
+  constexpr double kHardest_mps2 = 20.0, kLeast_s = 0.1;
+  constexpr std::ptrdiff_t kFewest = 3;
+  auto at = static_cast<std::ptrdiff_t>(end);
+  const auto size = static_cast<std::ptrdiff_t>(poses.size());
+  const auto passed = [&] {
+    return std::abs(toSeconds(poses[static_cast<std::size_t>(at)].time - poses[end].time));
+  };
+  for (std::ptrdiff_t count = 0; count < kFewest || passed() < kLeast_s; ++count) {
+    at += step;
+    if (at < 0 || at >= size) return 0.0;
+  }
+  const Eigen::Vector3d way = poses[static_cast<std::size_t>(at)].T_WB.p - poses[end].T_WB.p;
+  const double speed = way.norm() / passed();
+  return speed > kHardest_mps2 * passed() / 2.0 ? speed : 0.0;
+}
+
+/// The motion beside a still part, if positions stop and start harder than any body does; else
+/// nothing.
+std::string stoppingAtOnce(const Poses& poses, const Still& still) {
+  const double before = speedAtOnce(poses, still.first, -1),
+               after = speedAtOnce(poses, still.last, 1);
+  const bool from_start = still.first == 0, to_end = still.last + 1 == poses.size();
+  if ((before == 0.0 && !from_start) || (after == 0.0 && !to_end)) return {};
+  return fmt::format("and move at {:.1f} m/s beside that, without braking",
+                     std::max(before, after));
+}
+
+/// The evidence that a still part is not a rest; else nothing.
+std::string whyNoRest(const Poses& poses, const Still& still, AreSame are_same,
+                      const replay::Recording& recording, bool images) {
+  // At an end of the poses, a rest with other stamps looks like a part that stands still.
+  const bool at_end = still.first == 0 || still.last + 1 == poses.size();
+  if (!at_end || are_same == areSamePoses) {
+    const std::string moves =
+        movingIn(recording, poses[still.first].time, poses[still.last].time, are_same, images);
+    if (!moves.empty()) return "while " + moves;
+  }
+  if (are_same == areSameTurns) return {};
+  const std::string on = catchingUp(poses, still);
+  return on.empty() ? stoppingAtOnce(poses, still) : on;
 }
 
 }  // namespace
@@ -143,24 +191,19 @@ DataFindings judgePosesFrozen(const Poses& poses, const replay::Recording& recor
       {areSamePlaces, "positions of the poses stand"},
       {areSameTurns, "orientations of the poses stand"}};
   for (const auto& [are_same, what] : kParts) {
-    const auto still = longestStill(poses, are_same);
-    if (!still) continue;
-    // At an end of the poses, a rest with other stamps looks like a part that stands still.
-    const bool at_end = still->first == 0 || still->last + 1 == poses.size();
-    if (at_end && are_same != areSamePoses) continue;
-    const TimePoint from = poses[still->first].time, to = poses[still->last].time;
-    std::string moves = movingIn(recording, from, to, are_same, images);
-    if (!moves.empty()) {
-      moves = "while " + moves;
-    } else if (are_same == areSamePlaces) {
-      moves = catchingUp(poses, *still);
+    constexpr std::size_t kShown = 3;  // images are compared in so many parts, because that is slow
+    const auto parts = stillParts(poses, are_same);
+    for (std::size_t k = 0; k < parts.size(); ++k) {
+      const Still& still = parts[k];
+      const std::string why = whyNoRest(poses, still, are_same, recording, images && k < kShown);
+      if (why.empty()) continue;
+      const TimePoint from = poses[still.first].time, to = poses[still.last].time;
+      return {{Grade::kWarning, "poses_frozen",
+               fmt::format("the {} still from {} to {} ns ({:.1f} s, poses {} to {} of them) {}: "
+                           "a tracker that is lost repeats its last pose; leave those lines out",
+                           what, toNanoseconds(from), toNanoseconds(to), toSeconds(to - from),
+                           still.first + 1, still.last + 1, why)}};
     }
-    if (moves.empty()) continue;
-    return {{Grade::kWarning, "poses_frozen",
-             fmt::format("the {} still from {} to {} ns ({:.1f} s, poses {} to {} of them) {}: "
-                         "a tracker that is lost repeats its last pose; leave those lines out",
-                         what, toNanoseconds(from), toNanoseconds(to), toSeconds(to - from),
-                         still->first + 1, still->last + 1, moves)}};
   }
   return {};
 }

@@ -177,6 +177,21 @@ TEST(Clocks, DigitsOfATimeOfDayAreRecognisedAtAFullMinute) {
   }
 }
 
+TEST(Clocks, LostSamplesAndOtherCountersAreNoDigits) {
+  for (const std::int64_t interval_ns : {50'000'000, 5'000'000}) {
+    for (std::int64_t lost = 2; lost < 60; ++lost) {
+      for (const std::int64_t start_ms : {100, 59'950, 1'000'000}) {
+        std::vector<TimePoint> stamps;
+        for (std::int64_t i = 0; i < 40; ++i) {
+          const std::int64_t passed = i < 20 ? i : i + lost;
+          stamps.emplace_back(milliseconds(start_ms) + Duration(interval_ns * passed));
+        }
+        for (const auto& change : orderOf(stamps).changes) EXPECT_NE(change.kind, Kind::kDigits);
+      }
+    }
+  }
+}
+
 TEST(Clocks, ACounterMayComeRoundOftenAndFromAnyStart) {
   const Duration length(std::int64_t{1000} << 16);  // 65.5 ms
   expectRegular(orderWritten(100, [&](Duration time) { return time % length; }), 100);

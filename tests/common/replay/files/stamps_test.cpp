@@ -30,6 +30,13 @@ TEST(Stamps, ThatAreNoNanosecondsSayWhatTheyLookLike) {
     EXPECT_FALSE(parseNanoseconds(text)) << text;
     EXPECT_THAT(whyNoStamp(text), HasSubstr("no stamp")) << text;
   }
+  EXPECT_THAT(whyNoStamp("20261130071523123456"), HasSubstr("digits of a date"));
+  for (const char* text : {"20261130071523123", "261130071523123", "261130071523123456"}) {
+    EXPECT_NE(whyDateDigits(text), "") << text;
+  }
+  for (const char* text : {"1403636579763555584", "20261330071523123", "1403636579763555", "12"}) {
+    EXPECT_EQ(whyDateDigits(text), "") << text;
+  }
   EXPECT_THAT(whyNoStamp("1403636579.763555"), HasSubstr("looks like seconds"));
   EXPECT_THAT(whyNoStamp("1403636579763555555;-4"), HasSubstr("decimal commas"));
   EXPECT_THAT(whyNoStamp("1403636579763.5"), HasSubstr("looks like milliseconds"));
