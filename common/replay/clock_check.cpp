@@ -310,6 +310,12 @@ DataFinding findingOf(const ClockChange& first, std::size_t count, const std::st
                         "3600 HH + 60 MM + SS",
                         places, sensor, back ? "go back" : "jump ahead", step)};
   }
+  if (first.kind == Kind::kJoined) {
+    return {Grade::kFatal, "stamps_are_digits",
+            fmt::format("{}: in the stamps of {}, seconds and nanoseconds were joined without the "
+                        "leading zeros of the nanoseconds; write them with \"%d%09d\"",
+                        places, sensor)};
+  }
   if (first.kind == Kind::kPause) {
     return {Grade::kWarning, "clock_paused",
             fmt::format("{}: no data of {} for {}: the recording paused, or its clock was set "
@@ -327,7 +333,7 @@ DataFinding findingOf(const ClockChange& first, std::size_t count, const std::st
           fmt::format("{}: the stamps of {} {} by {}{}: cut the drive there into two", places,
                       sensor, back ? "go back" : "jump ahead", step,
                       isRestart(first)
-                          ? ", to their start: the device was restarted"
+                          ? ", to their start: a counter wrapped, or the device was restarted"
                           : ", those of the other sensors show no such step (their rate is "
                             "too low, or they have another clock)")};
 }

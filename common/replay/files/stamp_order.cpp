@@ -43,7 +43,14 @@ std::vector<Counter> counters() {
                      fmt::format("{} bits of {}", bits, tick.name)});
     }
   }
-  all.insert(all.end(), {{Duration(std::int64_t{1} << 48), "48 bits of ns"},
+  const auto ofRate = [](int bits, std::int64_t hz) {  // 2^bits · 10⁹ exceeds 64 bits
+    const std::int64_t ticks = std::int64_t{1} << bits, rest = ticks % hz;
+    return seconds(ticks / hz) + Duration(rest * 1'000'000'000 / hz);
+  };
+  all.insert(all.end(), {{ofRate(32, 90'000), "32 bits of 1/90 ms"},
+                         {ofRate(33, 90'000), "33 bits of 1/90 ms"},
+                         {ofRate(24, 32'768), "24 bits of 1/32768 s"},
+                         {Duration(std::int64_t{1} << 48), "48 bits of ns"},
                          {std::chrono::minutes(1), "a minute"},
                          {hours(1), "an hour"},
                          {hours(24), "a day"},
@@ -163,6 +170,33 @@ void dropRepeated(const Times& stamps, StampOrder& order) {
                   [&](std::size_t a, std::size_t b) { return stamps[a] == stamps[b]; });
   order.repeated = static_cast<std::size_t>(order.kept.end() - end);
   order.kept.erase(end, order.kept.end());
+}
+
+/// The first stamp of which leading zeros of the nanoseconds are missing ("%d%d" of seconds and
+/// nanoseconds); nothing if zeros do not put the stamps in order.
+std::optional<std::size_t> firstJoined(const Times& stamps) {
+  constexpr std::size_t kFraction = 9, kFewest = 3;
+  std::vector<std::string> written;
+  std::size_t longest = 0;
+  for (const TimePoint stamp : stamps) {
+    written.push_back(std::to_string(toNanoseconds(stamp)));
+    longest = std::max(longest, written.back().size());
+  }
+  if (longest <= kFraction || std::is_sorted(stamps.begin(), stamps.end())) return std::nullopt;
+  const std::size_t whole = longest - kFraction;
+  std::optional<std::size_t> first;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < written.size(); ++i) {
+    std::string& text = written[i];
+    if (text.size() == longest) continue;
+    if (text.size() <= whole) return std::nullopt;
+    text.insert(whole, longest - text.size(), '0');
+    ++count;
+    if (!first) first = i;
+  }
+  // Numbers of the same length are sorted like their digits.
+  const bool repaired = count >= kFewest && std::is_sorted(written.begin(), written.end());
+  return repaired ? first : std::nullopt;
 }
 
 /// a + b, limited to ±292 years.
@@ -294,13 +328,14 @@ class ClockWalk {
   }
 
   /// Finds the counter that has the length of the step back. Between regular stamps it must agree
-  /// to about a sample; if all stamps lie within one period of the counter, to 1 %.
+  /// to about a sample; if all stamps lie within one period of the counter, to 1 % and 20 samples.
   bool findCounter(ClockChange& change, bool regular) const {
     static const std::vector<Counter> kCounters = counters();
     for (const Counter& counter : kCounters) {
       const Duration gap = counter.length - between(change.before, change.after);
       const bool whole = least_ >= TimePoint{} && most_ < TimePoint{} + counter.length;
-      const Duration most = std::max(multipleOf(3, usual_), whole ? counter.length / 100 : usual_);
+      const Duration lost = std::min(counter.length / 100, multipleOf(kLost, usual_));
+      const Duration most = std::max(multipleOf(3, usual_), whole ? lost : usual_);
       if (!(whole || regular) || gap <= Duration{0} || gap > most ||
           multipleOf(whole ? 2 : 10, most) > counter.length)
         continue;
@@ -355,6 +390,15 @@ StampOrder orderOf(const std::vector<TimePoint>& given, const AreSame& same,
   StampOrder order;
   ClockWalk walk(given, same, known);
   order.changes = std::move(walk).changes();
+  if (const auto joined = firstJoined(given)) {
+    const TimePoint before = given[*joined == 0 ? 0 : *joined - 1], after = given[*joined];
+    order.changes = {{.kind = Kind::kJoined,
+                      .index = *joined,
+                      .before = before,
+                      .after = after,
+                      .continues = after,
+                      .common = true}};
+  }
   order.times = std::move(walk).times();
   const Times& stamps = order.times;
   order.kept.resize(stamps.size());

@@ -18,7 +18,8 @@ struct ClockChange {
     kCounter,  ///< a counter wrapped: `added` continues it exactly
     kSet,      ///< the clock was set: `added` continues it after a usual interval
     kPause,    ///< a pause, or a clock that was set forward; nothing is added
-    kDigits    ///< stamps are the digits of a time of day (HHMMSS); nothing is added
+    kDigits,   ///< stamps are the digits of a time of day (HHMMSS); nothing is added
+    kJoined    ///< seconds and nanoseconds were joined without leading zeros; nothing is added
   };
   Kind kind = Kind::kPause;
   /// Index of the first stamp after the change, in the order of the file.
@@ -30,7 +31,7 @@ struct ClockChange {
   std::string sensor = {};   ///< "imu", "accel", "frame", "stereo", "speed", "truth"
   std::string place = {};    ///< "FILE:LINE", or the number of the message
   TimePoint continues = {};  ///< `after` in the corrected time
-  bool common = false;       ///< the clocks of all sensors were set by the same amount; kDigits
+  bool common = false;       ///< the clocks of all sensors were set by the same amount; kDigits, kJoined
 };
 
 /// The stamps to keep, as indices in increasing order of their corrected times.

@@ -83,6 +83,13 @@ void refuseForeign(const std::filesystem::path& file, std::string_view text) {
       text.starts_with('<') ? "XML, as of CVAT or Pascal VOC; export the boxes as COCO JSON"
       : text.starts_with("PK\x03\x04") ? "a ZIP archive or a spreadsheet; save the table as CSV"
                                        : nullptr;
+  const auto isBinary = [](char c) { return c >= 0 && c < ' ' && c != '\t' && c != '\r'; };
+  if (!what && std::ranges::any_of(text, isBinary)) {
+    throw StartupError(ExitCode::kData,
+                       "{} is no text; give a table of boxes, or a network as --detections model "
+                       "--model FILE",
+                       file.c_str());
+  }
   if (!what) return;
   throw StartupError(ExitCode::kData,
                      "{} is {}, or write a table with the header frame,class,x1,y1,x2,y2,score",

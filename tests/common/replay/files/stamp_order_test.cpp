@@ -177,6 +177,20 @@ TEST(Clocks, DigitsOfATimeOfDayAreRecognisedAtAFullMinute) {
   }
 }
 
+TEST(Clocks, SecondsAndNanosecondsJoinedWithoutZerosAreRecognised) {
+  for (const std::int64_t start : {1000, 1'403'636'579}) {
+    std::vector<TimePoint> stamps;
+    for (int i = 0; i < 300; ++i) {
+      stamps.push_back(fromNanoseconds(
+          std::stoll(std::to_string(start + i / 100) + std::to_string(i % 100 * 10'000'000 + 5))));
+    }
+    const auto order = orderOf(stamps);
+    ASSERT_EQ(order.changes.size(), 1U);
+    EXPECT_EQ(order.changes[0].kind, Kind::kJoined);
+    EXPECT_EQ(order.changes[0].index, 0U);
+  }
+}
+
 TEST(Clocks, LostSamplesAndOtherCountersAreNoDigits) {
   for (const std::int64_t interval_ns : {50'000'000, 5'000'000}) {
     for (std::int64_t lost = 2; lost < 60; ++lost) {
