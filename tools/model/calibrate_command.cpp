@@ -28,8 +28,7 @@ did not see (five unbroken folds). Writes model.json and keeps the old one as mo
   perdure model calibrate net.onnx --frames ROOT --sequence 0001      KITTI tracking with image_02
   perdure model calibrate net.onnx --frames *_sync --labels label_02/0000.txt      KITTI raw
 
-Where nobody labelled anything, the objects that a run put on its map stand in for labels (with all
-classes of the network: what is not calibrated makes ghosts where few are asked for):
+Without labels, the objects on the map of a run replace them:
 
   perdure pipeline --data DRIVE --odometry vio --detections model --model net.onnx --out OUT
   perdure model calibrate net.onnx --frames DRIVE --labels OUT)";

@@ -117,8 +117,7 @@ void importAndLook(const ImportOptions& request) {
               out.c_str(), description.c_str(), out.c_str());
   std::printf(
       "calibrate   perdure model calibrate %s --frames DRIVE --labels OUT\n"
-      "            by a run over a drive of yours; until then ask for all classes: few "
-      "alone make ghosts\n",
+      "            by a run over a drive of yours\n",
       out.c_str());
 }
 

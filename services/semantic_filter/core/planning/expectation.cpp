@@ -58,8 +58,7 @@ std::vector<Visible> visibleFrom(const std::vector<Candidate>& candidates, const
     near.push_back(k);
     outlines.push_back(outlineOf(track, x, from));
   }
-  const auto visibilities = computeVisibility(outlines, {}, view.camera->width(),
-                                              view.camera->height(), parameters.visibility);
+  const auto visibilities = computeVisibility(outlines, {}, *view.camera, parameters.visibility);
   std::vector<Visible> visible;
   for (std::size_t i = 0; i < near.size(); ++i) {
     if (visibilities[i].fraction > 0.0) visible.push_back({near[i], visibilities[i]});

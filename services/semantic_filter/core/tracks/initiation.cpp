@@ -157,12 +157,18 @@ ScratchVector<Candidate> candidates(const BoxDetection& detection, const FrameCo
   return all;
 }
 
-/// Returns the sum of the frequencies of the network's classes, at most 10. A class of frequency 1
-/// then has at least a tenth of the prior, for any number of classes.
-double frequencies(const FrameContext& frame) {
+/// Returns the factor by which frequencies become probabilities of classes, times the number of
+/// classes. That number is there because a network's score already contains the share of its class.
+double weightOfFrequency(const FrameContext& frame) {
+  const auto& classes = frame.model->classes;
   double sum = 0.0;
-  for (const auto& name : frame.model->classes) sum += frame.priors->of(name).frequency;
-  return std::max(std::min(sum, 10.0), 1e-9);
+  for (const auto& name : classes) sum += frame.priors->of(name).frequency;
+  return static_cast<double>(classes.size()) / std::max(sum, 1e-9);
+}
+
+/// Returns the prior of *other*, times the number of classes.
+double weightOfOther(const FrameContext& frame) {
+  return static_cast<double>(frame.model->classes.size()) * frame.parameters->clutter.other_prior;
 }
 
 /// Censors the sides beside nearer boxes, because the object may continue behind these.
@@ -227,10 +233,9 @@ double logInitiationRatio(const BoxDetection& detection, const FrameContext& fra
   for (const auto& name : frame.model->classes) {
     sum += frame.priors->of(name).frequency * std::exp(logRatio(detection, *frame.model, name));
   }
-  const double named = sum / frequencies(frame);
+  const double named = (1.0 - p.clutter.other_prior) * sum * weightOfFrequency(frame);
   return std::log(p.initiation.odds) - detection.log_partial_views +
-         std::log((1.0 - p.clutter.other_prior) * named +
-                  p.clutter.other_prior * std::exp(detection.log_ratio_other));
+         std::log(named + weightOfOther(frame) * std::exp(detection.log_ratio_other));
 }
 
 std::optional<Track> initiate(const BoxDetection& detection, const std::optional<RangeHint>& range,
@@ -240,13 +245,13 @@ std::optional<Track> initiate(const BoxDetection& detection, const std::optional
   const auto kept = candidates(detection, frame);
   const BoxDetection seen = censoredBesideNearer(detection);
   Track track;
-  const double other = frame.parameters->clutter.other_prior;
-  const double named = (1.0 - other) / frequencies(frame);
+  const double named = (1.0 - frame.parameters->clutter.other_prior) * weightOfFrequency(frame);
   for (const auto& c : kept) {
     addClass(track, c.prior, named * std::exp(c.log_weight), seen, yawStarts(c.prior, frame, *ray),
              range, frame);
   }
-  addOther(track, other * std::exp(detection.log_ratio_other), seen, *ray, range, frame);
+  addOther(track, weightOfOther(frame) * std::exp(detection.log_ratio_other), seen, *ray, range,
+           frame);
   if (track.hypotheses.empty()) return std::nullopt;
   track.life.first_seen = track.life.last_seen = track.as_of = now;
   track.pose_product = frame.pose_error.product;

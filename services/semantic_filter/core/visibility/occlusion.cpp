@@ -247,12 +247,21 @@ struct InImage {
   double share;
 };
 
-InImage inImage(const Outline& o, double width, double height) {
+/// Returns the solid angle of a polygon of the image; distortion is ignored. In pixels, the near
+/// end of an object beside the camera would count far too much.
+double solidAngleOf(Polygon pixels, const CameraModel& camera) {
+  for (auto& p : pixels) {
+    p = {(p.x() - camera.cx()) / camera.fx(), (p.y() - camera.cy()) / camera.fy()};
+  }
+  return solidAngle(pixels);
+}
+
+InImage inImage(const Outline& o, const CameraModel& camera) {
   const Polygon hull = convexHull(o.box->points);
   InImage result;
-  result.inside = clip(clip(hull, 0, 0.0, true), 0, width, false);
-  result.inside = clip(clip(result.inside, 1, 0.0, true), 1, height, false);
-  result.share = polygonArea(result.inside) / std::max(polygonArea(hull), 1e-9);
+  result.inside = clip(clip(hull, 0, 0.0, true), 0, camera.width(), false);
+  result.inside = clip(clip(result.inside, 1, 0.0, true), 1, camera.height(), false);
+  result.share = solidAngleOf(result.inside, camera) / std::max(solidAngleOf(hull, camera), 1e-12);
   return result;
 }
 
@@ -276,9 +285,9 @@ Tally tallyOf(const DepthBuffer& buffer, const std::vector<Span>& spans, const O
   return tally;
 }
 
-DepthBuffer& begin(double width, double height, const VisibilityParameters& parameters) {
+DepthBuffer& begin(const CameraModel& camera, const VisibilityParameters& parameters) {
   thread_local DepthBuffer kept;
-  kept.begin(width, height, static_cast<double>(parameters.cell_px));
+  kept.begin(camera.width(), camera.height(), static_cast<double>(parameters.cell_px));
   return kept;
 }
 
@@ -298,7 +307,7 @@ Outline outlineOf(const Track& track, const State& x, const Projector& from, con
   return o;
 }
 
-double shareOfFirst(const ScratchVector<Outline>& outlines, double width, double height,
+double shareOfFirst(const ScratchVector<Outline>& outlines, const CameraModel& camera,
                     const VisibilityParameters& parameters) {
   const Outline& first = outlines.front();
   if (!first.box) return 0.0;
@@ -307,14 +316,14 @@ double shareOfFirst(const ScratchVector<Outline>& outlines, double width, double
     const bool hides = o.box && o.distance_m < first.distance_m && o.solidity >= parameters.solid;
     if (hides) hiding.push_back(&o);
   }
-  const InImage in_image = inImage(first, width, height);
+  const InImage in_image = inImage(first, camera);
   if (in_image.inside.empty()) return 0.0;
   if (hiding.empty()) return in_image.share;
   std::stable_sort(hiding.begin(), hiding.end(),
                    [](const auto* a, const auto* b) { return a->distance_m < b->distance_m; });
-  DepthBuffer& buffer = begin(width, height, parameters);
+  DepthBuffer& buffer = begin(camera, parameters);
   for (const Outline* o : hiding) {
-    paint(buffer, buffer.spansOf(inImage(*o, width, height).inside), *o);
+    paint(buffer, buffer.spansOf(inImage(*o, camera).inside), *o);
   }
   double cells = 0.0, hidden = 0.0;
   Blockers blockers(first);
@@ -330,19 +339,19 @@ double shareOfFirst(const ScratchVector<Outline>& outlines, double width, double
 
 ScratchVector<TrackVisibility> computeVisibility(const ScratchVector<Outline>& outlines,
                                                  const std::vector<LandmarkDepth>& points,
-                                                 double width, double height,
+                                                 const CameraModel& camera,
                                                  const VisibilityParameters& parameters) {
   ScratchVector<std::size_t> order(outlines.size());
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
     return outlines[a].distance_m < outlines[b].distance_m;
   });
-  DepthBuffer& buffer = begin(width, height, parameters);
+  DepthBuffer& buffer = begin(camera, parameters);
   ScratchVector<TrackVisibility> visibilities(outlines.size());
   for (const std::size_t j : order) {
     const Outline& o = outlines[j];
     if (!o.box) continue;
-    const InImage in_image = inImage(o, width, height);
+    const InImage in_image = inImage(o, camera);
     const std::vector<Span>& spans = buffer.spansOf(in_image.inside);
     const Tally tally = tallyOf(buffer, spans, o);
     const double by_points = points.empty() ? 0.0 : hiddenByPoints(o, in_image.inside, points);

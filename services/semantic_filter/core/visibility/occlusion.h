@@ -34,13 +34,13 @@ Outline outlineOf(const Track& track, const State& x, const Projector& from,
                   const Shape& shape = cuboidShape());
 
 /// Returns the visible fraction of the first outline, without landmarks and without a minimum.
-double shareOfFirst(const ScratchVector<Outline>& outlines, double width, double height,
+double shareOfFirst(const ScratchVector<Outline>& outlines, const CameraModel& camera,
                     const VisibilityParameters& parameters);
 
-/// Returns the visibility of each outline, in the same order. `width`, `height`: of the image, px.
+/// Returns the visibility of each outline, in the same order.
 ScratchVector<TrackVisibility> computeVisibility(const ScratchVector<Outline>& outlines,
                                                  const std::vector<LandmarkDepth>& points,
-                                                 double width, double height,
+                                                 const CameraModel& camera,
                                                  const VisibilityParameters& parameters);
 
 }  // namespace perdure::semantic_filter

@@ -97,7 +97,7 @@ double shareInSight(const ScratchVector<Standing>& things, const View& view,
   const double side = std::min(sides[2] - sides[0], sides[3] - sides[1]);
   parameters.cell_px = std::clamp(static_cast<std::int64_t>(side / kCellsAcross), std::int64_t{1},
                                   parameters.cell_px);
-  return shareOfFirst(outlines, camera.width(), camera.height(), parameters);
+  return shareOfFirst(outlines, camera, parameters);
 }
 
 /// Returns the visible fraction from which the first of `things` may be detected. If so much is

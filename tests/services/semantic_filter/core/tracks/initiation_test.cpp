@@ -66,5 +66,22 @@ TEST_F(InitiationInARow, TheUpdateDoesNotCompareASideAtANearerCar) {
   EXPECT_EQ(hiddenSides(score, 0, boxes_[0]), boxes_[0].beside_nearer);
 }
 
+// The score of a network for 80 classes contains the share of the class, as that for four does.
+// Without the factor of the number of classes the evidence would fall by log(80 / 4) = 3.
+TEST_F(InitiationInARow, ClassesThatTheNetworkExcludesDoNotLowerTheEvidenceOfABox) {
+  const double of_four = logInitiationRatio(boxes_[0], frame);
+  ModelInfo info = testing::makeModelInfo();
+  std::vector<double> ratios(boxes_[0].log_ratio.begin(), boxes_[0].log_ratio.end());
+  for (int i = 0; i < 76; ++i) {
+    info.classes.push_back("car");
+    info.classes.back() += std::to_string(i);
+    priors.classes.push_back(testing::makePrior(info.classes.back(), 4.2, 1.75, 1.5, 0.1));
+    ratios.push_back(-8.0);
+  }
+  model = makeModel(info);
+  boxes_[0].log_ratio = ratios;
+  EXPECT_NEAR(logInitiationRatio(boxes_[0], frame), of_four, 0.3);
+}
+
 }  // namespace
 }  // namespace perdure::semantic_filter

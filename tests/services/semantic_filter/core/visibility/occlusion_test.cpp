@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "tests/services/semantic_filter/scene.h"
 
 namespace perdure::semantic_filter {
@@ -26,7 +28,7 @@ class Occlusion : public ::testing::Test {
   }
   ScratchVector<TrackVisibility> seeThem(const ScratchVector<Outline>& o,
                                          const std::vector<LandmarkDepth>& points = {}) const {
-    return computeVisibility(o, points, camera.width(), camera.height(), {});
+    return computeVisibility(o, points, camera, {});
   }
   CameraModel camera{makeCamera()};
   View view;
@@ -52,15 +54,38 @@ TEST_F(Occlusion, AHalfHiddenCarIsPartialAndItsHiddenSideIsKnown) {
   EXPECT_FALSE(s[0].hidden_sides[2]);
 }
 
+// The camera is beside one end of a couch. Rays of random directions count how much of it is seen.
+TEST_F(Occlusion, TheShareInTheImageIsThatOfTheSolidAngle) {
+  const State couch = makeState(1.9, -0.8, 1.5, 0.3, 1.9, 0.95, 0.4);
+  const Eigen::Matrix3d R_OW = uprightRotation(couch[kYaw], view.up_W).transpose();
+  const RigidTransform T_WC = view.T_WC();
+  const Eigen::Array3d half = 0.5 * couch.segment<3>(kSize).array().exp();
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal;
+  double hits = 0.0, seen = 0.0;
+  for (int i = 0; i < 400'000; ++i) {
+    const Eigen::Vector3d ray = Eigen::Vector3d(normal(random), normal(random), normal(random));
+    const Eigen::Array3d from = R_OW * (T_WC.p - couch.head<3>()), along = R_OW * (T_WC.q * ray);
+    const Eigen::Array3d a = (-half - from) / along, b = (half - from) / along;
+    if (std::max(0.0, a.min(b).maxCoeff()) > a.max(b).minCoeff()) continue;
+    const auto pixel = camera.project(ray);
+    hits += 1.0;
+    seen += pixel && camera.inImage(*pixel);
+  }
+  const double fraction = seeThem({outline(7, couch)}).front().fraction;
+  ASSERT_GT(hits, 10'000);
+  EXPECT_GT(fraction, 0.25);
+  EXPECT_LT(fraction, 0.8);
+  EXPECT_NEAR(fraction, seen / hits, 0.02);
+}
+
 TEST_F(Occlusion, PaintingOnAnotherGridLeavesNothingBehind) {
   const auto rear = outline(7, makeState(30, 1.5, 0.75, M_PI / 2, 4.2, 1.7, 1.5));
   const auto front = outline(3, makeState(10, 1.3, 0.75, 0, 3.0, 1.8, 2.5));
   const auto share = [&](const ScratchVector<Outline>& things, std::int64_t cell_px) {
     VisibilityParameters parameters;
     parameters.cell_px = cell_px;
-    return computeVisibility(things, {}, camera.width(), camera.height(), parameters)
-        .front()
-        .fraction;
+    return computeVisibility(things, {}, camera, parameters).front().fraction;
   };
   const double coarse = share({rear, front}, 8), fine = share({rear, front}, 2);
   ASSERT_NEAR(coarse, fine, 0.15);
@@ -91,7 +116,7 @@ TEST_F(Occlusion, AVisibleFractionBelowTheMinimumIsAPartialView) {
   const double least = VisibilityParameters{}.minimum;
   const auto s = seeThem({outline(1, makeState(25, 2.1, 0.75, 0, 4.2, 1.7, 1.5)),
                           outline(2, makeState(10, 0, 0.75, 0, 4.2, 1.8, 1.7)),
-                          outline(3, makeState(12, 11.0, 0.75, 0, 4.2, 1.7, 1.5)),
+                          outline(3, makeState(12, 11.3, 0.75, 0, 4.2, 1.7, 1.5)),
                           outline(4, makeState(12, 30, 0.75, 0, 4.2, 1.7, 1.5))});
   EXPECT_EQ(s[0].state, Visibility::kOccluded);
   EXPECT_EQ(s[2].state, Visibility::kOutOfView);

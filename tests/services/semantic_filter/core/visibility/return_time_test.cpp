@@ -58,7 +58,7 @@ class ReturnTime : public ::testing::Test {
       view.T_WB = view.T_WB * way.step;
       const auto visibilities = computeVisibility({outlineOf(truth[1], truth[1].best().x, view),
                                                    outlineOf(truth[0], truth[0].best().x, view)},
-                                                  {}, camera.width(), camera.height(), parameters);
+                                                  {}, camera, parameters);
       if (visibilities[0].fraction > 0.0) return n * kFrame_s;
     }
     return 1e9;
