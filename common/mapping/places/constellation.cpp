@@ -20,6 +20,11 @@ constexpr double kStreet_m = 6.0;  // spread of the chance density around map ob
 constexpr double kReach_m = MapIndex::kReach_m;
 // Chance density far from the map's objects, m⁻²: one object in a disc of 100 m radius.
 constexpr double kFloor = 1.0 / (kPi * 100.0 * 100.0);
+// Distance within which observed objects are one group, for example a table, its chairs and the
+// monitors on it. Such groups look alike in all rooms.
+constexpr double kGroup_m = 1.0;
+// Differences of an object's estimates between two visits that their covariances do not contain.
+constexpr double kRepeat_m = 0.1, kRepeat_rad = 0.1;
 constexpr double kCell_m = 2.0, kCell_rad = 4.0 * kPi / 180.0;
 constexpr std::size_t kMostSeen = 48, kMostVotes = 250'000, kCandidates = 128;
 constexpr std::size_t kMostCells = 4096;  // largest number of cells from which candidates are
@@ -54,6 +59,7 @@ class Search {
         map_(map.objects()),
         prior_information_(inverseSymmetric(prior_.covariance)) {
     keepTheSurest();
+    weighGroups();
     weighClasses();
   }
 
@@ -107,6 +113,18 @@ class Search {
       return planeVariance(a) < planeVariance(b);
     });
     if (seen_.size() > kMostSeen) seen_.resize(kMostSeen);
+  }
+
+  /// Computes the share of each observed object in the evidence of its group.
+  void weighGroups() {
+    for (const PlacedObject& o : seen_) {
+      double members = 0.0;
+      for (const PlacedObject& other : seen_) {
+        const double squared = (other.p - o.p).head<2>().squaredNorm();
+        members += std::exp(-0.5 * squared / (kGroup_m * kGroup_m));
+      }
+      group_shares_.push_back(1.0 / members);
+    }
   }
 
   /// Computes the probability of each class of each observed object, divided by the share of the
@@ -309,17 +327,18 @@ class Search {
       l.by_chance +=
           std::exp(-0.5 * squared / (kStreet_m * kStreet_m)) / (2.0 * kPi * kStreet_m * kStreet_m);
       Eigen::Matrix2d S = known.covariance.topLeftCorner<2, 2>() + turned;
-      S.diagonal().array() += blur * blur;
+      S.diagonal().array() += blur * blur + kRepeat_m * kRepeat_m;
       const double determinant = S.determinant();
       const double mahalanobis = (S(1, 1) * off.x() * off.x() - 2.0 * S(0, 1) * off.x() * off.y() +
                                   S(0, 0) * off.y() * off.y()) /
                                  determinant;
       if (mahalanobis > 25.0) return;
-      const double density = sameClass(i, k) *
-                             std::exp(-0.5 * mahalanobis +
-                                      logSameYaw(known.yaw - seen.yaw - x.yaw,
-                                                 seen.covariance(3, 3) + known.covariance(3, 3))) /
-                             (2.0 * kPi * std::sqrt(determinant));
+      const double density =
+          sameClass(i, k) *
+          std::exp(-0.5 * mahalanobis + logSameYaw(known.yaw - seen.yaw - x.yaw,
+                                                   seen.covariance(3, 3) + known.covariance(3, 3) +
+                                                       kRepeat_rad * kRepeat_rad)) /
+          (2.0 * kPi * std::sqrt(determinant));
       l.of_map += density;
       if (density > l.of_object) {
         l.of_object = density;
@@ -358,7 +377,7 @@ class Search {
     double sum = -0.5 * deviations2(x);
     for (std::size_t i = 0; i < seen_.size(); ++i) {
       const Likelihood l = likelihoodOf(i, x, R, 0.0);
-      sum += std::log1p(-l.known + l.known * l.of_map / (l.by_chance + kFloor));
+      sum += group_shares_[i] * std::log1p(-l.known + l.known * l.of_map / (l.by_chance + kFloor));
     }
     return sum;
   }
@@ -375,8 +394,9 @@ class Search {
       x.p.head<2>() += reach * way;
       const Eigen::Matrix3d R = x.R();
       double sum = 0.0;
-      for (const PlacedObject& seen : seen_) {
-        sum += std::log1p(-index_.knownShare((x.p + R * seen.p).head<2>()));
+      for (std::size_t i = 0; i < seen_.size(); ++i) {
+        const double known = index_.knownShare((x.p + R * seen_[i].p).head<2>());
+        sum += group_shares_[i] * std::log1p(-known);
       }
       best = std::max(best, sum);
     }
@@ -405,6 +425,7 @@ class Search {
   PlaceParameters parameters_;
   LevelGaussian prior_;
   std::vector<PlacedObject> seen_;
+  std::vector<double> group_shares_;
   const MapIndex& index_;
   const std::vector<PlacedObject>& map_;
   Eigen::Matrix4d prior_information_;
