@@ -65,25 +65,27 @@ Frame frameOf(int index) {
   return frame;
 }
 
-/// Returns the best evidence against clutter for any of `names` at the box `truth`; -100 if no box
-/// is there.
-double evidenceAt(const Detections& detections, const ModelInfo& model,
-                  const std::vector<std::string>& names, const Box& truth) {
+/// Returns the network's best log-odds for any of `names` at the box `truth`; -100 if no box is
+/// there.
+double oddsAt(const Detections& detections, const Node& node, const std::vector<std::string>& names,
+              const Box& truth) {
+  const ModelInfo& model = node.model();
   double best = -100;
   for (const std::string& name : names) {
     const auto it = std::find(model.classes.begin(), model.classes.end(), name);
     const auto k = static_cast<std::size_t>(it - model.classes.begin()) + 1;
     for (const Detection& d : detections.detections) {
       if (intersectionOverUnion(d.box, truth) < 0.5) continue;
-      best = std::max(best, double{d.activations[k]} - d.activations[0]);
+      const double evidence = double{d.activations[k]} - d.activations[0];
+      best = std::max(best, oddsOf(node.description().calibration, evidence));
     }
   }
   return best;
 }
 
-/// Threshold of the evidence (a score of 0.12 before calibration) above which a car counts as
-/// found.
-constexpr double kSeen = -2.0;
+/// Threshold of the network's own log-odds (a score of 0.035) above which a car counts as found. It
+/// does not depend on the calibration.
+constexpr double kSeen = -3.3;
 
 struct Expectation {
   const char* file;
@@ -113,8 +115,7 @@ TEST_P(Networks, FindTheLabelledCarsOfTheRealDrive) {
       const bool car = label.type == "Car" || label.type == "Van";
       if (!car || label.truncated || label.occluded || label.box.height() < 40) continue;
       ++cars;
-      const double evidence = evidenceAt(*out, node.model(), {"car", "truck"}, label.box);
-      found += evidence > kSeen;
+      found += oddsAt(*out, node, {"car", "truck"}, label.box) > kSeen;
     }
   }
   EXPECT_GE(found, GetParam().recall * cars);
@@ -125,7 +126,7 @@ TEST_P(Networks, SeeTheVanOfTheFirstFrameAndAnswerTheSameTwice) {
   const auto out = node.infer(frameOf(0));
   ASSERT_TRUE(out) << out.error().detail;
   const Box van = labelsOf(0).at(2).box;
-  EXPECT_GT(evidenceAt(*out, node.model(), {"car", "truck"}, van), kSeen);
+  EXPECT_GT(oddsAt(*out, node, {"car", "truck"}, van), kSeen);
   const auto again = node.infer(frameOf(0));
   ASSERT_TRUE(again);
   ASSERT_EQ(again->detections.size(), out->detections.size());
