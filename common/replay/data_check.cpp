@@ -117,6 +117,28 @@ void checkLost(const Recording& recording, const DataUse& use, DataFindings& fin
   }
 }
 
+/// Adds imu_repeats for the longest run of equal samples, if it is long: noise changes each sample
+/// of a sensor that measures.
+void checkRepeatedSamples(const std::vector<ImuSample>& samples, DataFindings& findings) {
+  constexpr std::size_t kFewest = 20;
+  constexpr Duration kLeast = std::chrono::milliseconds(300);
+  const auto areSame = [](const ImuSample& a, const ImuSample& b) {
+    return a.gyro == b.gyro && a.accel == b.accel;
+  };
+  std::size_t first = 0, last = 0;
+  for (std::size_t from = 0, i = 1; i < samples.size(); ++i) {
+    if (!areSame(samples[from], samples[i])) from = i;
+    if (i - from > last - first) first = from, last = i;
+  }
+  if (last - first < kFewest || samples[last].time - samples[first].time < kLeast) return;
+  findings.push_back(
+      {Grade::kWarning, "imu_repeats",
+       fmt::format("the IMU repeats one sample from {} to {} ns ({:.1f} s, {} samples): its driver "
+                   "or its recorder stood still; cut the drive there",
+                   toNanoseconds(samples[first].time), toNanoseconds(samples[last].time),
+                   toSeconds(samples[last].time - samples[first].time), last - first + 1)});
+}
+
 }  // namespace
 
 DataFindings checkImuUnits(const std::vector<ImuSample>& samples) {
@@ -139,7 +161,15 @@ DataFindings checkImuUnits(const std::vector<ImuSample>& samples) {
     return findings;
   }
   addForceUnit(samples, force, findings);
-  if (turn > 6.0) {
+  constexpr double kNoBody = 300.0;  // rad/s, 48 turns a second
+  if (turn > kNoBody) {
+    findings.push_back(
+        {Grade::kFatal, "gyro_scale",
+         fmt::format("rates of turn are {:.3g} rad/s (median), which no body reaches: they are in "
+                     "thousandths of a degree per second (multiply by 1.74533e-5), or the sensor's "
+                     "counts (multiply by the scale of its data sheet)",
+                     turn)});
+  } else if (turn > 6.0) {
     findings.push_back(
         {Grade::kWarning, "gyro_scale",
          fmt::format("rates of turn are {:.3g} rad/s (median), more than a turn a "
@@ -156,6 +186,7 @@ DataFindings checkData(const Recording& recording, const DataUse& use) {
   if (use.imu && std::none_of(findings.begin(), findings.end(), isFatal)) {
     const DataFindings units = checkImuUnits(recording.imu);
     findings.insert(findings.end(), units.begin(), units.end());
+    checkRepeatedSamples(recording.imu, findings);
   }
   if (!use.images) return findings;
   if (use.imu) checkUpright(recording, findings);

@@ -27,7 +27,23 @@ constexpr char kImuColumns[] =
 
 using Fields = std::vector<std::string_view>;
 
+/// Returns whether commas separate the columns and the decimals: six numbers are two fields each.
+bool hasDecimalCommas(const Fields& fields) {
+  if (fields.size() != 13) return false;
+  for (std::size_t i = 2; i < fields.size(); i += 2) {
+    const auto decimals = trim(fields[i]);
+    if (!std::ranges::all_of(decimals, [](char c) { return c >= '0' && c <= '9'; })) return false;
+  }
+  return true;
+}
+
 std::string judgeImu(const Fields& fields) {
+  if (hasDecimalCommas(fields)) {
+    return std::string(
+               "13 columns: the numbers have decimal commas; export the table with decimal "
+               "points; ") +
+           kImuColumns;
+  }
   if (fields.size() != 7)
     return std::to_string(fields.size()) + " columns; " + kImuColumns +
            (fields.size() > 7 ? "; perdure doctor --data DRIVE --fix COPY leaves others out" : "");

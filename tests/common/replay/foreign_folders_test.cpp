@@ -164,6 +164,14 @@ TEST(ForeignFolder, TenColumnsAreRefusedAndSevenNamed) {
               AllOf(HasSubstr("11 columns"), HasSubstr("seven columns are awaited")));
 }
 
+TEST(ForeignFolder, DecimalCommasBetweenCommasAreNamed) {
+  const auto root = tinyEuroc("decimal_commas");
+  changeLines(root / "mav0/imu0/data.csv", [](std::size_t, const std::string& line) {
+    return line.substr(0, line.find(',')) + ",0,1,-0,2,0,3,9,7,0,5,-0,5";
+  });
+  EXPECT_THAT(errorOfFolder(root), HasSubstr("13 columns: the numbers have decimal commas"));
+}
+
 TEST(ForeignFolder, AHeadThatNamesAccelerationsFirstIsBelieved) {
   const auto root = tinyEuroc("force_first");
   const auto file = root / "mav0/imu0/data.csv";

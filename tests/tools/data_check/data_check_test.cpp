@@ -332,6 +332,25 @@ TEST(DataCheck, GravityThatWasTakenAwayIsNoMatterOfUnits) {
   EXPECT_THAT(codesOf(replay::checkImuUnits(samples)), ElementsAre("accel_in_g"));
 }
 
+TEST(DataCheck, RatesThatNoBodyReachesAreRefused) {
+  std::vector<ImuSample> samples(50);
+  for (auto& sample : samples) sample.accel = {0.3, -0.2, 9.8}, sample.gyro = {17'000, 0, 0};
+  const auto findings = replay::checkImuUnits(samples);
+  ASSERT_THAT(codesOf(findings), ElementsAre("gyro_scale"));
+  EXPECT_THAT(findings[0].text, HasSubstr("thousandths of a degree"));
+}
+
+TEST(DataCheck, AnImuThatRepeatsOneSampleIsNamed) {
+  TurningDrive drive;
+  ImuSample stuck;
+  std::size_t count = 0;
+  drive.change = [&](ImuSample& sample) {
+    if (++count == 200) stuck = sample;
+    if (count > 200 && count < 300) sample.gyro = stuck.gyro, sample.accel = stuck.accel;
+  };
+  EXPECT_THAT(codesOf(findingsOf("stuck_imu", drive)), testing::Contains("imu_repeats"));
+}
+
 TEST(DataCheck, ExchangedColumnsAreToldByGravity) {
   TurningDrive drive;
   drive.change = [](ImuSample& sample) { std::swap(sample.gyro, sample.accel); };
