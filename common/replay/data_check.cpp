@@ -120,7 +120,7 @@ void checkLost(const Recording& recording, const DataUse& use, DataFindings& fin
 /// Adds imu_repeats for the longest run of equal samples, if it is long: noise changes each sample
 /// of a sensor that measures.
 void checkRepeatedSamples(const std::vector<ImuSample>& samples, DataFindings& findings) {
-  constexpr std::size_t kFewest = 20;
+  constexpr std::size_t kRepeated = 20;
   constexpr Duration kLeast = std::chrono::milliseconds(300);
   const auto areSame = [](const ImuSample& a, const ImuSample& b) {
     return a.gyro == b.gyro && a.accel == b.accel;
@@ -130,7 +130,7 @@ void checkRepeatedSamples(const std::vector<ImuSample>& samples, DataFindings& f
     if (!areSame(samples[from], samples[i])) from = i;
     if (i - from > last - first) first = from, last = i;
   }
-  if (last - first < kFewest || samples[last].time - samples[first].time < kLeast) return;
+  if (last - first < kRepeated || samples[last].time - samples[first].time < kLeast) return;
   findings.push_back(
       {Grade::kWarning, "imu_repeats",
        fmt::format("the IMU repeats one sample from {} to {} ns ({:.1f} s, {} samples): its driver "
