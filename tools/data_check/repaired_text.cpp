@@ -136,6 +136,26 @@ bool isOf(const WholeUnit& unit, const Table& table) {
   return stamp && *stamp >= unit.least && *stamp <= unit.most;
 }
 
+/// Refuses seconds whose decimals lack their leading zeros ("%d.%d" of seconds and nanoseconds):
+/// they are in order only with these zeros.
+void refuseUnpadded(const Table& table) {
+  std::vector<std::pair<std::string, std::string>> written;
+  for (const auto& row : table.rows) {
+    const auto dot = row[0].find('.');
+    if (dot == row[0].npos) return;
+    written.emplace_back(row[0].substr(0, dot), row[0].substr(dot + 1));
+  }
+  if (std::ranges::is_sorted(written)) return;
+  std::size_t longest = 0;
+  for (const auto& [whole, decimals] : written) longest = std::max(longest, decimals.size());
+  for (auto& [whole, decimals] : written) decimals.insert(0, longest - decimals.size(), '0');
+  if (!std::ranges::is_sorted(written)) return;
+  throw StartupError(ExitCode::kData,
+                     "{}: the decimals of the stamps lack their leading zeros; write seconds and "
+                     "nanoseconds with \"%d.%09d\"",
+                     table.file.string());
+}
+
 bool repairStamps(Table& table, const WholeUnit& whole, std::vector<std::string>& fixes) {
   std::size_t places = placesShort(table);
   if (places == 0 && isOf(whole, table)) places = whole.places;
@@ -143,6 +163,7 @@ bool repairStamps(Table& table, const WholeUnit& whole, std::vector<std::string>
   if (const auto why = replay::whyDateDigits(table.rows.front()[0]); !why.empty()) {
     throw StartupError(ExitCode::kData, "{}: the first stamp, {}", table.file.string(), why);
   }
+  if (places == 9) refuseUnpadded(table);
   const char* unit = places == 9 ? "seconds" : places == 6 ? "milliseconds" : "microseconds";
   for (auto& row : table.rows) {
     auto stamp = shifted(row[0], places);

@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 #include <sqlite3.h>
+#include <sys/resource.h>
 
 #include <array>
-#include <cerrno>
 #include <cstring>
 #include <fstream>
 
@@ -71,10 +71,14 @@ fs::path targetOf(const fs::path& link) {
 
 std::string sqliteError(sqlite3* connection, int code) {
   std::string text = connection != nullptr ? sqlite3_errmsg(connection) : sqlite3_errstr(code);
+  if ((code & 0xff) != SQLITE_IOERR) return text;
   const int cause = connection != nullptr ? sqlite3_system_errno(connection) : 0;
-  if ((code & 0xff) != SQLITE_IOERR || cause == 0) return text;
-  text += std::string(": ") + std::strerror(cause);
-  if (cause == EFBIG) text += " (a limit of this shell, `ulimit -f`, or of the file system)";
+  if (cause != 0) text += std::string(": ") + std::strerror(cause);
+  // SQLite does not keep the system's cause of each error.
+  rlimit limit{};
+  if (getrlimit(RLIMIT_FSIZE, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY) {
+    text += fmt::format("; files are limited to {} bytes (ulimit -f)", limit.rlim_cur);
+  }
   return text;
 }
 

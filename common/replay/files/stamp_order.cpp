@@ -276,6 +276,8 @@ class ClockWalk {
     for (const Duration second : {Duration(1'000'000'000), Duration(1'000'000), Duration(1000)}) {
       // 0.5 to 2000 samples a second; other units are wrong
       if (usual_ > 2 * second || multipleOf(2000, usual_) < second) continue;
+      const auto isTime = [&](TimePoint stamp) { return timeOfDay(stamp, second).has_value(); };
+      if (!std::ranges::all_of(stamps_, isTime)) continue;
       const auto before = timeOfDay(change.before, second), after = timeOfDay(change.after, second);
       const Duration minute = second * 60, day = minute * 60 * 24;
       if (!before || !after || *after % minute > *before % minute) continue;

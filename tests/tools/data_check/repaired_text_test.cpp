@@ -75,6 +75,20 @@ TEST(RepairedText, WholeMillisecondsAreKnownByTheRatesOfImuAndCamera) {
   expectSound(text);
 }
 
+TEST(RepairedText, SecondsWhoseDecimalsLackZerosAreRefused) {
+  const auto root = makeTurningDrive("text_unpadded");
+  for (const char* sensor : {"imu0", "cam0"}) {
+    rewrite(root / "mav0" / sensor / "data.csv", [](const std::string& line) {
+      const std::string text = inSeconds(line);
+      const auto dot = text.find('.') + 1, end = text.find(',');
+      const auto zeros = text.find_first_not_of('0', dot);
+      return text.substr(0, dot) + text.substr(std::min(zeros, end - 1));
+    });
+  }
+  EXPECT_THAT(replay::startupErrorOf([&] { const RepairedText text(root); }),
+              HasSubstr("lack their leading zeros"));
+}
+
 TEST(RepairedText, StampsInSecondsBecomeNanosecondsExactly) {
   const auto root = makeTurningDrive("text_seconds");
   rewrite(root / "mav0/imu0/data.csv", inSeconds);
