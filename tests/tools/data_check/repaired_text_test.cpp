@@ -10,6 +10,7 @@
 
 #include "common/base/errors.h"
 #include "common/replay/dataset.h"
+#include "tests/common/replay/tiny_datasets.h"
 #include "tests/tools/data_check/turning_drive.h"
 
 namespace perdure::tools {
