@@ -73,6 +73,11 @@ Doubts doubtsOfRun(const RunFacts& facts) {
                                   facts.without_pose, facts.frames),
                       "provide poses of the whole drive, at most 0.5 s apart"});
   }
+  if (facts.poses && 2 * *facts.poses < facts.frames && facts.without_pose == 0) {
+    doubts.push_back({fmt::format("only {} of {} frames have a pose", *facts.poses, facts.frames),
+                      "the map has only what these frames show; perdure doctor --data reports why "
+                      "vio starts late or waits"});
+  }
   if (facts.boxes > 0 && facts.objects == 0) {
     doubts.push_back({fmt::format("the map is empty although there are {} boxes", facts.boxes),
                       "check that they belong to these frames, that their classes are known, and "
@@ -89,6 +94,8 @@ Doubts doubtsOfRun(const RunFacts& facts) {
       {"images_repeated", "images are repeated"},
       {"lines_lost", "lines of the recording were not used"},
       {"boxes_beyond", "boxes of other frames were not used"},
+      {"boxes_outside", "boxes may be of images of another size"},
+      {"imu_repeats", "the IMU repeats one sample"},
       {"poses_", "the poses contradict the drive"}};
   for (const auto& finding : facts.findings) {
     const auto kind = std::ranges::find_if(

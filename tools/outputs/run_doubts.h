@@ -20,7 +20,8 @@ struct RunFacts {
   ReasonCounts vio = {};
   std::uint64_t frames = 0;  ///< frames of the first camera
   ReasonCounts capture = {};
-  std::uint64_t without_pose = 0;  ///< frames without a given pose
+  std::optional<std::uint64_t> poses = {};  ///< number of frames with a pose; nothing: not counted
+  std::uint64_t without_pose = 0;           ///< frames without a given pose
   std::uint64_t boxes = 0, objects = 0;
   replay::DataFindings findings = {};  ///< findings before the run
 };

@@ -154,6 +154,7 @@ Doubts Pipeline::doubts() const {
   auto doubts = doubtsOfRun({.vio = of_vio,
                              .frames = counts_.frames,
                              .capture = dataset_->reasons(),
+                             .poses = counts_.poses,
                              .without_pose = reasons_.of("frame_without_pose"),
                              .boxes = counts_.detections,
                              .objects = outputs_->history().lastBeliefs().size(),

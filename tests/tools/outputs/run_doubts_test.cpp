@@ -59,6 +59,9 @@ TEST(Doubts, TwoFramesOfReferenceAreTold) {
 
 TEST(Doubts, TheLastLineNamesWhatWouldElseBeSilent) {
   EXPECT_EQ(endOfLine(doubtsOfRun({.frames = 240})), "");
+  EXPECT_EQ(endOfLine(doubtsOfRun({.frames = 240, .poses = 120})), "");
+  EXPECT_EQ(endOfLine(doubtsOfRun({.frames = 240, .poses = 1})),
+            " | WARNING: only 1 of 240 frames have a pose");
   EXPECT_THAT(doubtsAt("frame_without_update", 24), IsEmpty());
   ReasonCounts vio;
   vio.add("frame_without_update", 90);
