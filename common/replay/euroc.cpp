@@ -32,7 +32,8 @@ bool hasDecimalCommas(const Fields& fields) {
   if (fields.size() != 13) return false;
   for (std::size_t i = 2; i < fields.size(); i += 2) {
     const auto decimals = trim(fields[i]);
-    if (!std::ranges::all_of(decimals, [](char c) { return c >= '0' && c <= '9'; })) return false;
+    if (decimals.find_first_not_of("0123456789eE+-") != decimals.npos) return false;
+    if (decimals.empty() || decimals[0] < '0' || decimals[0] > '9') return false;
   }
   return true;
 }
