@@ -154,7 +154,7 @@ Doubts Pipeline::doubts() const {
   auto doubts = doubtsOfRun({.vio = of_vio,
                              .frames = counts_.frames,
                              .capture = dataset_->reasons(),
-                             .poses = counts_.poses,
+                             .poses = vio_ ? std::optional(counts_.odometry) : std::nullopt,
                              .without_pose = reasons_.of("frame_without_pose"),
                              .boxes = counts_.detections,
                              .objects = outputs_->history().lastBeliefs().size(),
