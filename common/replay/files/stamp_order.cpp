@@ -9,6 +9,7 @@
 
 #include "common/base/algorithms/median.h"
 #include "common/replay/files/stamps.h"
+#include "common/replay/files/text_file.h"
 
 namespace perdure::replay {
 namespace {
@@ -194,9 +195,13 @@ std::optional<std::size_t> firstJoined(const Times& stamps) {
     ++count;
     if (!first) first = i;
   }
-  // Numbers of the same length are sorted like their digits.
-  const bool repaired = count >= kFewest && std::is_sorted(written.begin(), written.end());
-  return repaired ? first : std::nullopt;
+  if (count < kFewest) return std::nullopt;
+  for (std::size_t i = 1; i < written.size(); ++i) {
+    constexpr std::int64_t kSecond = 1'000'000'000;
+    const auto before = parseInteger(written[i - 1]), after = parseInteger(written[i]);
+    if (!before || !after || *after < *before || *after - *before > kSecond) return std::nullopt;
+  }
+  return first;
 }
 
 /// a + b, limited to ±292 years.
