@@ -1,7 +1,9 @@
 // Problems of a run that ended normally. They are printed as warnings and stored in report.json.
 #pragma once
 
+#include <cstdint>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 

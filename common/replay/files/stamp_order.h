@@ -51,7 +51,8 @@ using AreSame = std::function<bool(std::size_t, std::size_t)>;
 /// over a day ahead, is a change of the clock if the stamps increase regularly on both sides. It is
 /// not one if the stamps after it fill a gap before it (lines in another order) or repeat samples
 /// before it. A counter that wrapped is recognised by its length. If the clock seems to be set more
-/// than eight times, the list consists of overlapping batches, and no change is assumed. `known`
+/// than eight times, the list consists of overlapping batches, and no change is assumed. Stamps that
+/// are digits, or were joined without zeros, are reported as a change and not corrected. `known`
 /// has the changes of the recording's other sensors; by them a clock that was set back by a few
 /// intervals is recognised.
 ///

@@ -61,8 +61,9 @@ replay::DataFindings judgePosesOfCamera(const std::vector<replay::StampedPose>& 
 replay::DataFindings judgePosesBackwards(const std::vector<replay::StampedPose>& poses,
                                          const replay::Recording& recording);
 
-/// Finds a pose that is repeated for over 0.4 s while the gyroscope, the speed or (if `images`) the
-/// images show motion. Code: poses_frozen.
+/// Finds a pose that is repeated for 0.4 s or more while the gyroscope, the speed or (if `images`)
+/// the images show motion; also one whose position then jumps, or that stops and starts without
+/// braking. Code: poses_frozen.
 replay::DataFindings judgePosesFrozen(const std::vector<replay::StampedPose>& poses,
                                       const replay::Recording& recording, bool images);
 
