@@ -31,7 +31,7 @@ struct ClockChange {
   std::string sensor = {};   ///< "imu", "accel", "frame", "stereo", "speed", "truth"
   std::string place = {};    ///< "FILE:LINE", or the number of the message
   TimePoint continues = {};  ///< `after` in the corrected time
-  bool common = false;       ///< the clocks of all sensors were set by the same amount; kDigits, kJoined
+  bool common = false;  ///< the clocks of all sensors were set by the same amount; kDigits, kJoined
 };
 
 /// The stamps to keep, as indices in increasing order of their corrected times.
@@ -51,10 +51,10 @@ using AreSame = std::function<bool(std::size_t, std::size_t)>;
 /// over a day ahead, is a change of the clock if the stamps increase regularly on both sides. It is
 /// not one if the stamps after it fill a gap before it (lines in another order) or repeat samples
 /// before it. A counter that wrapped is recognised by its length. If the clock seems to be set more
-/// than eight times, the list consists of overlapping batches, and no change is assumed. Stamps that
-/// are digits, or were joined without zeros, are reported as a change and not corrected. `known`
-/// has the changes of the recording's other sensors; by them a clock that was set back by a few
-/// intervals is recognised.
+/// than eight times, the list consists of overlapping batches, and no change is assumed. Stamps
+/// that are digits, or were joined without zeros, are reported as a change and not corrected.
+/// `known` has the changes of the recording's other sensors; by them a clock that was set back by a
+/// few intervals is recognised.
 ///
 /// Other stamps out of order are removed as strays if they are few, far outside their neighbours'
 /// stamps, and do not fill a gap elsewhere. They are few if they are a fiftieth of all or at most
