@@ -41,7 +41,9 @@ class Watched {
     std::optional<TimePoint> first;
     std::size_t images = 0;
     replay::ReadAhead ahead(dataset);
-    while (const auto message = ahead.next()) {
+    while (!options.stop.stop_requested()) {
+      const auto message = ahead.next();
+      if (!message) break;
       if (const auto* imu = std::get_if<ImuSample>(&*message)) node_->onImu(*imu), ++samples_;
       if (const auto* speed = std::get_if<SpeedSample>(&*message)) node_->onSpeed(*speed);
       const auto* frame = std::get_if<Frame>(&*message);

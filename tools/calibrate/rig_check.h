@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,7 @@ struct RigCheckOptions {
   double seconds = 60.0;       ///< largest duration of the drive that is used
   bool until_sure = false;     ///< ends when everything is good and vio is certain
   vio::Config vio = {};
+  std::stop_token stop = {};  ///< ends the run early; its result is then of no use
 };
 
 /// Vio's estimate of the first camera's extrinsics, and the quality of vio's run.

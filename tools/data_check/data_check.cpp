@@ -56,8 +56,10 @@ bool surelyAgree(const std::vector<Turn>& turns, const std::vector<ImuSample>& s
 replay::DataFindings checkTurns(const replay::Recording& recording) {
   const CameraCalibration& camera = recording.calibration.cameras.front();
   const auto lively = livelinessOfAxes(recording.imu);
-  if (surelyAgree(turnsOfImages(recording, lively, 36), recording.imu, camera)) return {};
-  const auto turns = turnsOfImages(recording, recording.imu);
+  KnownTurns known;
+  const auto few = turnsOfImages(recording, lively, 36, &known);
+  if (surelyAgree(few, recording.imu, camera)) return {};
+  const auto turns = turnsOfImages(recording, recording.imu, 60, &known);
   if (disagree(turns, recording.imu, camera)) {
     if (auto clocks = checkClockLine(recording); !clocks.empty()) return clocks;
   }
@@ -77,7 +79,7 @@ replay::DataFindings checkTurns(const replay::Recording& recording) {
   }
   if (!findings.empty() || axesSurelyAgree(turns, recording.imu, camera)) return findings;
   constexpr std::size_t kTurns = 120;  // an axis with little rotation needs more pairs
-  return judgeAxisChanges(turnsOfImages(recording, lively, kTurns), recording.imu, camera);
+  return judgeAxisChanges(turnsOfImages(recording, lively, kTurns, &known), recording.imu, camera);
 }
 
 }  // namespace

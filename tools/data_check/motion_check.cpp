@@ -74,41 +74,59 @@ CameraCalibration reduced(CameraCalibration camera, int factor) {
   return camera;
 }
 
-std::vector<Turn> turnsOfRun(const Frames& frames, const CameraCalibration& calibration,
-                             const Run& run) {
+/// The rotations of the pairs from `run.first` to before `run.second`.
+KnownTurns turnsOfRun(const Frames& frames, const CameraCalibration& calibration, const Run& run) {
   constexpr std::uint32_t kColumns = 340;
   const int factor = replay::reductionFor(calibration, kColumns);
   const CameraModel camera(reduced(calibration, factor));
-  std::vector<Turn> turns;
+  KnownTurns turns;
   FollowedImage before;
   for (std::size_t i = run.first; i <= run.second; ++i) {
     const auto image = replay::monoImageOf(*frames[i], factor);
     const bool fits = image && replay::isOfCamera(*image, factor, calibration);
     FollowedImage now = fits ? FollowedImage(*image) : FollowedImage();
-    if (i > run.first && !before.empty() && !now.empty()) {
-      const auto flow = flowBetween(camera, before, now);
-      if (!flow.empty()) {
-        turns.push_back({frames[i - 1]->time, frames[i]->time, rotationOf(flow)});
-      }
+    if (i > run.first) {
+      auto& turn = turns[i - 1];
+      const auto flow =
+          before.empty() || now.empty() ? std::vector<Flow>() : flowBetween(camera, before, now);
+      if (!flow.empty()) turn = {frames[i - 1]->time, frames[i]->time, rotationOf(flow)};
     }
     before = std::move(now);
   }
   return turns;
 }
 
-/// Reads image files in parallel, but images inside a recording file one after another.
-std::vector<Turn> turnsOfRuns(const Frames& frames, const CameraCalibration& calibration,
-                              const std::vector<Run>& chosen) {
-  const bool files = !frames.front()->load;
-  std::vector<std::future<std::vector<Turn>>> runs;
-  for (const auto& run : chosen) {
-    runs.push_back(std::async(files ? std::launch::async : std::launch::deferred,
-                              [&, run] { return turnsOfRun(frames, calibration, run); }));
+/// The parts of `run` that are not known, each short enough that several are computed in parallel.
+std::vector<Run> unknownIn(const Run& run, const KnownTurns& known) {
+  constexpr std::size_t kLongest = 20;
+  std::vector<Run> parts;
+  for (std::size_t i = run.first; i < run.second; ++i) {
+    if (known.contains(i)) continue;
+    const bool follows = !parts.empty() && parts.back().second == i;
+    if (!follows || i - parts.back().first >= kLongest) parts.emplace_back(i, i);
+    parts.back().second = i + 1;
   }
+  return parts;
+}
+
+/// Adds what is not known. Reads image files in parallel, but images inside a recording file one
+/// after another.
+std::vector<Turn> turnsOfRuns(const Frames& frames, const CameraCalibration& calibration,
+                              const std::vector<Run>& chosen, KnownTurns& known) {
+  const auto policy = frames.front()->load ? std::launch::deferred : std::launch::async;
+  std::vector<std::future<KnownTurns>> parts;
+  for (const auto& run : chosen) {
+    for (const Run& part : unknownIn(run, known)) {
+      parts.push_back(
+          std::async(policy, [&, part] { return turnsOfRun(frames, calibration, part); }));
+    }
+  }
+  for (auto& part : parts) known.merge(part.get());
   std::vector<Turn> turns;
-  for (auto& run : runs) {
-    const auto more = run.get();
-    turns.insert(turns.end(), more.begin(), more.end());
+  for (const auto& run : chosen) {
+    for (std::size_t i = run.first; i < run.second; ++i) {
+      if (const auto& turn = known.at(i)) turns.push_back(*turn);
+    }
   }
   return turns;
 }
@@ -265,15 +283,17 @@ replay::DataFindings judgePlace(const std::vector<Turn>& turns, const TurnIntegr
 }  // namespace
 
 std::vector<Turn> turnsOfImages(const Recording& recording, const std::vector<ImuSample>& samples,
-                                std::size_t most) {
+                                std::size_t most, KnownTurns* known) {
+  KnownTurns none;
   const Frames frames = firstCamera(recording);
   if (frames.size() < 2 || samples.size() < 2) return {};
   return turnsOfRuns(frames, recording.calibration.cameras.front(),
-                     liveliestRuns(liveliness(frames, samples), most));
+                     liveliestRuns(liveliness(frames, samples), most), known ? *known : none);
 }
 
-std::vector<Turn> turnsAlong(const Recording& recording) {
+std::vector<Turn> turnsAlong(const Recording& recording, KnownTurns* known) {
   constexpr std::size_t kRuns = 8, kPairs = 15;
+  KnownTurns none;
   const Frames frames = firstCamera(recording);
   if (frames.size() < 2) return {};
   const std::size_t pairs = frames.size() - 1, length = std::min(kPairs, pairs),
@@ -283,7 +303,7 @@ std::vector<Turn> turnsAlong(const Recording& recording) {
     const std::size_t first = i * (pairs - length) / std::max<std::size_t>(1, runs - 1);
     chosen.emplace_back(first, first + length);
   }
-  return turnsOfRuns(frames, recording.calibration.cameras.front(), chosen);
+  return turnsOfRuns(frames, recording.calibration.cameras.front(), chosen, known ? *known : none);
 }
 
 bool disagree(const std::vector<Turn>& turns, const std::vector<ImuSample>& samples,

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -19,13 +20,19 @@ struct Turn {
   Eigen::Vector3d of_images = Eigen::Vector3d::Zero();  ///< rad, in C
 };
 
+/// Rotations by the index of the pair's first image among those of cam0; empty where fewer than 15
+/// corners could be tracked.
+using KnownTurns = std::map<std::size_t, std::optional<Turn>>;
+
 /// Rotations of up to `most` consecutive image pairs of cam0, chosen at the largest changes of the
-/// rates of `samples`. Pairs with fewer than 15 tracked corners are omitted.
+/// rates of `samples`. Pairs with fewer than 15 tracked corners are omitted. Images of pairs in
+/// `known` are not read again; what is read is added to it.
 std::vector<Turn> turnsOfImages(const replay::Recording& recording,
-                                const std::vector<ImuSample>& samples, std::size_t most = 60);
+                                const std::vector<ImuSample>& samples, std::size_t most = 60,
+                                KnownTurns* known = nullptr);
 
 /// Rotations of image pairs of cam0 at places all over the drive, independent of the IMU.
-std::vector<Turn> turnsAlong(const replay::Recording& recording);
+std::vector<Turn> turnsAlong(const replay::Recording& recording, KnownTurns* known = nullptr);
 
 /// Whether the images or the gyroscope rotate enough for a judgement and contradict each other.
 bool disagree(const std::vector<Turn>& turns, const std::vector<ImuSample>& samples,

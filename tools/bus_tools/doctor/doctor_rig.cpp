@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <future>
+#include <memory>
+#include <stop_token>
 
 #include "tools/bus_tools/doctor/doctor.h"
 #include "tools/calibrate/motion/from_motion.h"
@@ -119,18 +122,24 @@ Findings checkRigBy(const Drive& drive, std::optional<double> seconds) {
   calibrate::RigCheckOptions options;
   options.data = drive.data, options.until_sure = !seconds;
   if (seconds) options.seconds = *seconds;
-  auto dataset = replay::Dataset::open(inGrey(drive));
-  if (!checkRecording(drive, dataset->recording(), findings)) return findings;
-  if (!seconds) {
-    dataset =
-        std::make_unique<replay::Dataset>(inGrey(drive), calibrate::thinned(dataset->recording()));
-  }
-  const auto check = calibrate::checkRig(*dataset, options);
+  const auto read = replay::Dataset::open(inGrey(drive));
+  const replay::Recording& recording = read->recording();
+  replay::Dataset of_vio(inGrey(drive), seconds ? recording : calibrate::thinned(recording));
+  // Vio runs beside the other checks, except over images that can only be read one after another.
+  const bool files = std::ranges::none_of(recording.frames, [](auto& one) { return !!one.load; });
+  std::stop_source others_failed;
+  options.stop = others_failed.get_token();
+  auto run = std::async(files ? std::launch::async : std::launch::deferred,
+                        [&] { return calibrate::checkRig(of_vio, options); });
+  const std::unique_ptr<std::stop_source, void (*)(std::stop_source*)> at_end(
+      &others_failed, [](std::stop_source* source) { source->request_stop(); });
+  if (!checkRecording(drive, recording, findings)) return findings;
+  const auto check = run.get();
   auto judgements = calibrate::judgeRig(check);
   settleUpsideDown(calibrate::worstOf(judgements) == calibrate::Grade::kGood, findings);
   if (check.cameras > 1 && calibrate::isSecondSuspect(check)) {
     options.vio.stereo = false;
-    const auto second = calibrate::judgeSecond(check, calibrate::checkRig(*dataset, options));
+    const auto second = calibrate::judgeSecond(check, calibrate::checkRig(of_vio, options));
     judgements.insert(judgements.begin(), second.begin(), second.end());
   }
   for (const auto& judgement : judgements) {
