@@ -71,6 +71,7 @@ install(TARGETS perdure-ros2 COMPONENT ros2)
 install(FILES deploy/systemd/perdure-ros2.service
   DESTINATION ${PERDURE_SYSTEM_LIBDIR}/systemd/system COMPONENT ros2)
 install(FILES config/ros2.yaml DESTINATION ${etc} COMPONENT ros2)
+install(DIRECTORY deploy/ros2/ DESTINATION ${share}/ros2 COMPONENT ros2)
 
 # The command line tool, with the programs that `model import` runs.
 install(TARGETS perdure COMPONENT tools)

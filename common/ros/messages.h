@@ -181,6 +181,12 @@ struct Imu {
   }
 };
 
+struct Clock {
+  static constexpr char kType[] = "rosgraph_msgs/Clock";
+  Time clock;
+  static void fields(auto& m, auto& a) { a("clock", m.clock); }
+};
+
 struct PointField {
   static constexpr char kType[] = "sensor_msgs/PointField";
   static constexpr std::uint8_t kFloat32 = 7;

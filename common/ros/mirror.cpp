@@ -41,6 +41,8 @@ std::vector<Outlet> Mirror::outlets(const std::vector<std::string>& cameras) con
                           outletOf<DiagnosticArray>(prefix_ + "/diagnostics")};
   if (!tracked_objects_.empty())
     all.push_back(outletOf<autoware::TrackedObjects>(tracked_objects_));
+  if (wanted_) all.push_back(outletOf<PointCloud2>(prefix_ + "/obstacles"));
+  if (clock_) all.push_back(outletOf<Clock>("/clock"));
   for (const std::string& camera : cameras) {
     all.push_back(outletOf<Image>(imageTopic(camera)));
     all.push_back(outletOf<CompressedImage>(compressedTopic(imageTopic(camera))));
@@ -88,6 +90,7 @@ RigidTransform Mirror::inMap(const WorldId& world) const {
 }
 
 void Mirror::onOdometry(const perdure::Odometry& odometry) {
+  if (clock_) say("/clock", [&] { return Clock{headerOf(odometry.stamp.time, "").stamp}; });
   if (odometry.state == OdometryState::kInitialising) return;
   newest_ = std::max(newest_, odometry.stamp.time);
   say(prefix_ + "/odometry", [&] { return odometryOf(odometry, imu_); });
@@ -114,6 +117,7 @@ void Mirror::onDetections(const Detections& detections) {
 void Mirror::onObjects(const Objects& objects) {
   say(prefix_ + "/objects", [&] { return detections3dOf(objects); });
   say(prefix_ + "/markers", [&] { return markersOf(objects); });
+  if (wanted_) say(prefix_ + "/obstacles", [&] { return obstaclesOf(objects); });
   if (tracked_objects_.empty()) return;
   say(tracked_objects_, [&] { return autoware::trackedObjectsOf(objects, inMap(objects.world)); });
 }

@@ -32,12 +32,14 @@ class Mirror {
   /// topic is latched.
   using Wanted = std::function<bool(const Outlet& outlet)>;
   /// `prefix` precedes all topics except /tf and /tf_static. Without `wanted`, all messages are
-  /// created.
+  /// created, except obstacles, which are large and follow from the objects.
   Mirror(std::string prefix, Out out, Wanted wanted = {})
       : prefix_(std::move(prefix)), out_(std::move(out)), wanted_(std::move(wanted)) {}
 
   /// Also publishes objects as Autoware's TrackedObjects on this topic, unless it is empty.
   void sayTrackedObjects(const std::string& topic) { tracked_objects_ = topic; }
+  /// Also publishes the time of each odometry message on /clock, for nodes with use_sim_time.
+  void sayClock(bool say) { clock_ = say; }
 
   /// All topics that may be published for a vehicle with these cameras, to declare them in advance.
   std::vector<Outlet> outlets(const std::vector<std::string>& cameras) const;
@@ -49,12 +51,13 @@ class Mirror {
     return prefix_ + "/" + camera + "/image_raw";
   }
   void onImu(const ImuSample& sample);
-  void onOdometry(const perdure::Odometry& odometry);  ///< publishes odometry, tf
+  void onOdometry(const perdure::Odometry& odometry);  ///< publishes odometry, tf, clock
   void onLandmarks(const Landmarks& landmarks);
   void onModel(const ModelInfo& model);
   void onDetections(const Detections& detections);
   void onMapFrame(const MapFrame& frame) { map_frame_ = frame; }
-  void onObjects(const Objects& objects);  ///< publishes objects, markers, Autoware's objects
+  void onObjects(
+      const Objects& objects);  ///< publishes objects, markers, obstacles, Autoware's objects
   /// Publishes diagnostics with the latest stamp of all messages so far.
   void onHealth(const Health& health);
 
@@ -67,6 +70,7 @@ class Mirror {
   RigidTransform inMap(const WorldId& world) const;
 
   std::string prefix_, tracked_objects_;
+  bool clock_ = false;
   Out out_;
   Wanted wanted_;
   std::map<std::string, Outlet> outlets_;

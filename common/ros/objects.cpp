@@ -104,6 +104,53 @@ void addMarkers(const ObjectBelief& object, const Objects& all, const Header& he
   markers.markers.push_back(std::move(label));
 }
 
+using CloudPoint = std::pair<Eigen::Vector3d, double>;  ///< position in W, intensity
+
+PointCloud2 cloudOf(TimePoint time, const std::vector<CloudPoint>& points) {
+  constexpr std::array kNames{"x", "y", "z", "intensity"};
+  PointCloud2 cloud;
+  cloud.header = headerOf(time, kOdomFrame);
+  for (std::uint32_t i = 0; i < kNames.size(); ++i)
+    cloud.point_fields.push_back({kNames[i], 4 * i, PointField::kFloat32, 1});
+  cloud.point_step = 4 * kNames.size();
+  cloud.width = static_cast<std::uint32_t>(points.size());
+  cloud.row_step = cloud.width * cloud.point_step;
+  auto data = std::make_shared<std::vector<std::uint8_t>>(cloud.row_step);
+  std::uint8_t* to = data->data();
+  for (const auto& [p, intensity] : points) {
+    const std::array values{static_cast<float>(p.x()), static_cast<float>(p.y()),
+                            static_cast<float>(p.z()), static_cast<float>(intensity)};
+    std::memcpy(to, values.data(), sizeof values);
+    to += sizeof values;
+  }
+  cloud.data = std::move(data);
+  return cloud;
+}
+
+/// Adds points of the four sides of a box.
+void addSides(const Cuboid& box, double intensity, std::vector<CloudPoint>& points) {
+  constexpr double kAlong = 0.1, kUp = 0.25;  // m, largest distances
+  constexpr double kMost = 200.0;             // steps, whatever the size
+  const auto steps = [&](double length, double step) {
+    return std::clamp(std::ceil(length / step), 1.0, kMost);
+  };
+  const Eigen::Vector3d half = box.size / 2.0;
+  const double levels = steps(box.size.z(), kUp);
+  for (const int axis : {0, 1}) {
+    const double n = steps(box.size[axis], kAlong);
+    for (double i = 0; i < n; ++i) {
+      for (double level = 0; level <= levels; ++level) {
+        Eigen::Vector3d p = -half;
+        p[axis] += box.size[axis] * i / n;
+        p.z() += box.size.z() * level / levels;
+        points.emplace_back(box.T_WO * p, intensity);
+        p.head<2>() *= -1.0;  // the opposite side
+        points.emplace_back(box.T_WO * p, intensity);
+      }
+    }
+  }
+}
+
 }  // namespace
 
 Detection3DArray detections3dOf(const Objects& objects) {
@@ -174,28 +221,20 @@ Odometry odometryOf(const perdure::Odometry& odometry, const std::optional<Imu>&
 }
 
 PointCloud2 cloudOf(const Landmarks& landmarks) {
-  constexpr std::array kNames{"x", "y", "z", "intensity"};
-  PointCloud2 cloud;
-  cloud.header = headerOf(landmarks.stamp.time, kOdomFrame);
-  for (std::uint32_t i = 0; i < kNames.size(); ++i)
-    cloud.point_fields.push_back({kNames[i], 4 * i, PointField::kFloat32, 1});
-  cloud.point_step = 4 * kNames.size();
-  cloud.width = static_cast<std::uint32_t>(landmarks.landmarks.size());
-  cloud.row_step = cloud.width * cloud.point_step;
-  auto data = std::make_shared<std::vector<std::uint8_t>>(cloud.row_step);
-  std::uint8_t* to = data->data();
+  std::vector<CloudPoint> points;
   for (const Landmark& one : landmarks.landmarks) {
-    const double sigma = std::sqrt(std::max(0.0, one.covariance.trace() / 3.0));
-    const std::array<float, 4> values{static_cast<float>(one.p_W.x()),
-                                      static_cast<float>(one.p_W.y()),
-                                      static_cast<float>(one.p_W.z()), static_cast<float>(sigma)};
-    std::memcpy(to, values.data(), sizeof values);
-    to += sizeof values;
+    points.emplace_back(one.p_W, std::sqrt(std::max(0.0, one.covariance.trace() / 3.0)));
   }
-  cloud.data = std::move(data);
-  return cloud;
+  return cloudOf(landmarks.stamp.time, points);
 }
 
+PointCloud2 obstaclesOf(const Objects& objects) {
+  std::vector<CloudPoint> points;
+  for (const ObjectBelief& object : objects.objects) {
+    if (object.confirmed) addSides(cuboidOf(object, objects.up_W), object.existence, points);
+  }
+  return cloudOf(objects.stamp.time, points);
+}
 DiagnosticStatus statusOf(const Health& health) {
   using Status = DiagnosticStatus;
   DiagnosticStatus status;

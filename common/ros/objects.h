@@ -30,6 +30,9 @@ Odometry odometryOf(const perdure::Odometry& odometry, const std::optional<Imu>&
 /// x, y, z and σ of each landmark in `odom`. The field of σ has the name `intensity`, which viewers
 /// expect.
 PointCloud2 cloudOf(const Landmarks& landmarks);
+/// Points in `odom` on the sides of the confirmed objects' boxes, occluded ones and those out of
+/// view as well: at most 0.1 m apart horizontally, 0.25 m vertically. `intensity` is the existence.
+PointCloud2 obstaclesOf(const Objects& objects);
 DiagnosticStatus statusOf(const Health& health);
 
 }  // namespace perdure::ros

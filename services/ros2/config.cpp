@@ -23,6 +23,9 @@ void describeOut(Config& c, config::Fields& fields) {
   fields.texts("out.cameras", c.shown_cameras, {"cameras whose images are available"});
   fields.boolean("out.tf", c.tf,
                  {"publish /tf and /tf_static; false if another node publishes odom to base_link"});
+  fields.boolean("out.clock", c.clock,
+                 {"publish /clock, the time of the newest odometry, for nodes with use_sim_time; "
+                  "for drives with stamps of their own"});
   fields.text("out.tracked_objects", c.tracked_objects,
               {"topic of autoware_perception_msgs/TrackedObjects, which Autoware reads; empty: "
                "none"});

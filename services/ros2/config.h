@@ -48,7 +48,7 @@ struct Config {
   bool out = true;
   std::string prefix = "/perdure";
   std::vector<std::string> shown_cameras = {"cam0"};
-  bool tf = true;
+  bool tf = true, clock = false;
   std::string tracked_objects;
   std::int64_t image_quality = 80;
 

@@ -30,6 +30,7 @@ class Outwards {
             config.prefix, [&](const auto& outlet, auto cdr) { ros.write(outlet, std::move(cdr)); },
             [&](const auto& outlet) { return ros.wants(outlet.topic); }) {
     mirror_.sayTrackedObjects(config.tracked_objects);
+    mirror_.sayClock(config.clock);
     for (const ros::Outlet& outlet : mirror_.outlets(config.shown_cameras)) {
       if (config.tf || !outlet.topic.starts_with("/tf")) ros.advertise(outlet);
     }
@@ -74,7 +75,7 @@ class Outwards {
                    [this](const Landmarks& m) { mirror_.onLandmarks(m); });
     add<Detections>(bus::kTopic<Detections>, {topic("detections")},
                     [this](const Detections& m) { mirror_.onDetections(m); });
-    std::vector<std::string> of_objects{topic("objects"), topic("markers")};
+    std::vector<std::string> of_objects{topic("objects"), topic("markers"), topic("obstacles")};
     if (!config_.tracked_objects.empty()) of_objects.push_back(config_.tracked_objects);
     add<Objects>(bus::kTopic<Objects>, std::move(of_objects), [this](const Objects& m) {
       mirror_.onObjects(m);
