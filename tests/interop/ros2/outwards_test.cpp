@@ -120,11 +120,11 @@ std::map<std::string, json> newestOfAll(BridgeRig& rig, Vehicle& vehicle, std::s
 
 TEST(Ros2Outwards, EveryTopicIsReceivedWithItsValues) {
   BridgeRig rig;
-  rig.startBridge({});
+  rig.startBridge({"out.clock=true"});
   Vehicle vehicle(rig);
   rig.listen();
-  auto all = newestOfAll(rig, vehicle, 12);
-  ASSERT_EQ(all.size(), 12u) << rig.log();
+  auto all = newestOfAll(rig, vehicle, 14);
+  ASSERT_EQ(all.size(), 14u) << rig.log();
 
   const json& image = all["/perdure/cam0/image_raw"];
   EXPECT_EQ(image["encoding"], "mono8");
@@ -157,6 +157,8 @@ TEST(Ros2Outwards, EveryTopicIsReceivedWithItsValues) {
   for (const int i : {21, 28, 35})
     EXPECT_NEAR(odometry["twist_covariance"][i].get<double>(), 1e-4, 1e-12) << "of the gyroscope";
 
+  EXPECT_EQ((all["/clock"]["clock"].get<std::int64_t>() - kStart) % kFrame, 0);
+
   const json& tf = all["/tf"]["transforms"];
   ASSERT_EQ(tf.size(), 2u);
   EXPECT_EQ(tf[0]["header"]["frame"], "map");
@@ -178,6 +180,9 @@ TEST(Ros2Outwards, EveryTopicIsReceivedWithItsValues) {
   EXPECT_EQ(point[0], 1.5F);
   EXPECT_EQ(point[1], -2.5F);
   EXPECT_EQ(point[3], 0.5F);
+
+  EXPECT_EQ(all["/perdure/obstacles"]["header"]["frame"], "odom");
+  EXPECT_GT(all["/perdure/obstacles"]["width"], 500) << "the sides of one car";
 
   const json& found = all["/perdure/detections"]["detections"];
   ASSERT_EQ(found.size(), 1u);

@@ -52,6 +52,7 @@ json linesOf(const tf2_msgs::msg::dds_::TFMessage_& m) {
                    {"q", xyzw(t.transform().rotation())}});
   return {{"transforms", all}};
 }
+json linesOf(const rosgraph_msgs::msg::dds_::Clock_& m) { return {{"clock", nsOf(m.clock())}}; }
 json linesOf(const nav_msgs::msg::dds_::Odometry_& m) {
   return {{"header", of(m.header())},
           {"child", m.child_frame_id()},
@@ -233,6 +234,10 @@ int main(int argc, char** argv) {
   all.hear<vision::Detection3DArray_, vision::Detection3DArray_PubSubType>("/perdure/objects",
                                                                            Quality::kDefault);
   all.hear<MarkerArray_, MarkerArray_PubSubType>("/perdure/markers", Quality::kDefault);
+  all.hear<sensor::PointCloud2_, sensor::PointCloud2_PubSubType>("/perdure/obstacles",
+                                                                 Quality::kSensor);
+  all.hear<rosgraph_msgs::msg::dds_::Clock_, rosgraph_msgs::msg::dds_::Clock_PubSubType>(
+      "/clock", Quality::kSensor);
   all.hear<DiagnosticArray_, DiagnosticArray_PubSubType>("/perdure/diagnostics", Quality::kDefault);
   all.hear<autoware_perception_msgs::msg::dds_::TrackedObjects_,
            autoware_perception_msgs::msg::dds_::TrackedObjects_PubSubType>(
