@@ -23,11 +23,10 @@ fs::path placeOf(const fs::path& file) {
 
 /// How to get room for a file. A limit of this process is as likely a cause as a full disk.
 std::string fixOfRoom() {
-  rlimit limit{};
-  const bool limited = getrlimit(RLIMIT_FSIZE, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY;
-  return limited ? "raise the size limit of files, which is " + std::to_string(limit.rlim_cur) +
-                       " bytes (ulimit -f), or free space"
-                 : "free space, or write to another disk";
+  const auto limit = fileSizeLimit();
+  return limit ? "raise the size limit of files, which is " + std::to_string(*limit) +
+                     " bytes (ulimit -f), or free space"
+               : "free space, or write to another disk";
 }
 
 }  // namespace
@@ -73,6 +72,12 @@ void flushChecked(std::ostream& stream, const fs::path& file) {
   errno = 0;
   stream.flush();
   if (!stream) throwUnwritten(file, failed_before ? "not all of it could be written" : "");
+}
+
+std::optional<std::uint64_t> fileSizeLimit() {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_FSIZE, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return std::nullopt;
+  return limit.rlim_cur;
 }
 
 void throwUnwritten(const fs::path& file, std::string_view why) {

@@ -1,8 +1,10 @@
 // Result files that are either complete or absent; every write is checked.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <string_view>
 
 namespace perdure {
@@ -34,6 +36,10 @@ void writeChecked(const std::filesystem::path& file, std::string_view content);
 /// Flushes a stream into `file`, which stays open. Throws StartupError(kInputOutput) if the flush
 /// or an earlier write failed.
 void flushChecked(std::ostream& stream, const std::filesystem::path& file);
+
+/// The largest size of a file that this process may write, in bytes. Returns nothing if there is no
+/// limit (ulimit -f).
+std::optional<std::uint64_t> fileSizeLimit();
 
 /// Throws StartupError(kInputOutput) with the message "FILE: `why`; free space, …". If `why` is
 /// empty, the reason is that of errno.

@@ -1,6 +1,7 @@
 #include "common/replay/image_check.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -8,6 +9,7 @@
 #include <random>
 #include <set>
 
+#include "common/base/files/access.h"
 #include "common/replay/files/image_folder.h"
 
 namespace perdure::replay {
@@ -19,8 +21,9 @@ using FileList = std::vector<const Recording::FrameFile*>;
 
 /// A camera's image files, classified without reading them.
 struct Listed {
-  std::size_t all = 0, missing = 0;
-  FileList empty, whole;  ///< sorted by time; images of a recording count as whole
+  std::size_t all = 0, missing = 0, denied = 0;
+  std::string why_denied = {};  ///< of the first denied file
+  FileList empty, whole;        ///< sorted by time; images of a recording count as whole
 };
 
 Listed listedOf(const Recording& recording, std::size_t camera) {
@@ -30,6 +33,8 @@ Listed listedOf(const Recording& recording, std::size_t camera) {
     ++listed.all;
     std::error_code error;
     const auto size = frame.load ? 1 : fs::file_size(frame.path, error);
+    if (!frame.load && !error && access(frame.path.c_str(), R_OK) != 0 && listed.denied++ == 0)
+      listed.why_denied = perdure::whyUnreadable(frame.path);
     if (error) {
       ++listed.missing;
     } else {
@@ -159,6 +164,11 @@ void checkImages(const Recording& recording, std::size_t camera, DataFindings& f
   const CameraCalibration& calibration = recording.calibration.cameras[camera];
   const Listed listed = listedOf(recording, camera);
   if (listed.all == 0 || !checkFiles(recording, camera, listed, findings)) return;
+  if (!listed.why_denied.empty()) {
+    findings.push_back({ImageGrade::kWarning, "images_denied",
+                        fmt::format("{} of {} images of {} may not be read: {}", listed.denied,
+                                    listed.all, calibration.name, listed.why_denied)});
+  }
   Looked looked = lookAt(someOf(listed.whole, 9), calibration);
   // Check more images, because the first ones may not be representative.
   if (looked.unreadable == looked.tried) looked = lookAt(someOf(listed.whole, 60), calibration);

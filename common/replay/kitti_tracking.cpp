@@ -57,7 +57,7 @@ std::size_t countFrames(const DatasetOptions& options, const fs::path& images) {
   if (options.frame_count) return *options.frame_count;
   const fs::path labels = options.path / "label_02" / (options.sequence + ".txt");
   if (!fs::exists(labels)) {
-    throwMissing(images, "the images of sequence " + options.sequence,
+    throwMissing(images, "the folder of images of sequence " + options.sequence,
                  "without images and labels a pose file of one line a frame must be given, so "
                  "that the number of frames is known");
   }

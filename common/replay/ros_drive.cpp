@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 #include <tuple>
 #include <utility>
 
@@ -206,6 +207,7 @@ class RosDriveReader {
   std::optional<M> valueIn(const RosMessage& message, const char* kind) {
     auto value = messages_.valueOf<M>(message);
     if (value) return *std::move(value);
+    if (!message.data.empty() && message.data[0] == '{') json_.insert(message.topic);
     recording_.reasons.add(std::string(kind) + "_malformed");
     return std::nullopt;
   }
@@ -271,9 +273,15 @@ class RosDriveReader {
 
   void requireImages() const {
     if (!cameras_.front().images.empty()) return;
+    const std::string& topic = cameras_.front().topics.image;
+    if (json_.contains(topic)) stop(topic + jsonText());
     const std::string problem = messages_.lastProblem();
-    stop(cameras_.front().topics.image + " has no whole image" +
-         (problem.empty() ? "; record it again" : ": " + problem));
+    stop(topic + " has no whole image" + (problem.empty() ? "; record it again" : ": " + problem));
+  }
+
+  static std::string jsonText() {
+    return " holds JSON text, although the recording declares binary messages of ROS; record the "
+           "topic with ros2 bag record, or convert it";
   }
 
   void addFrames(std::size_t index) {
@@ -313,6 +321,7 @@ class RosDriveReader {
            ")" + fix);
     }
     if (imu_.empty()) return *calibration;
+    if (json_.contains(imu_)) stop(imu_ + jsonText());
     const std::string& frame =
         camera.frame_id.empty() ? camera.info->header.frame_id : camera.frame_id;
     const auto T_BC = tree_.find(imu_frame_, frame);
@@ -358,9 +367,10 @@ class RosDriveReader {
     said += imu_.empty() ? "and there is no inertial unit" : "the inertial unit is " + imu_;
     for (const auto& [name, topic] : messages_.topics()) {
       if (imu_.empty() && topic.type.starts_with("sensor_msgs/Imu in ")) {
-        said += "; those on " + name + " are " + topic.type + ", which is not read";
+        said += "; " + name + " has " + topic.type + ", which is not read; convert it";
       }
     }
+    if (json_.contains(imu_)) said += "; " + imu_ + jsonText();
     recording_.notes.push_back(said);
   }
 
@@ -371,6 +381,7 @@ class RosDriveReader {
   Recording recording_;
   std::vector<RosCamera> cameras_;
   std::string imu_, imu_frame_;
+  std::set<std::string> json_;  ///< topics with JSON in place of binary messages
   ros::FrameTree tree_;
   std::vector<RosSample> samples_;
 };

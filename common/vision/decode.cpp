@@ -5,6 +5,7 @@
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 
+#include "common/base/files/access.h"
 #include "common/base/files/text_mode.h"
 
 namespace perdure::vision {
@@ -118,7 +119,8 @@ Result<cv::Mat> decodeImageFile(const std::string& path, std::optional<ImageEnco
   std::ifstream file(path, std::ios::binary | std::ios::ate);
   const auto size = file ? std::streamoff(file.tellg()) : -1;
   if (size < 0 || std::filesystem::is_directory(path)) {
-    return fail("image_missing", path + " cannot be read");
+    const std::string why = whyUnreadable(path);
+    return fail("image_missing", why.empty() ? path + " cannot be read" : why);
   }
   std::string bytes(static_cast<std::size_t>(size), '\0');
   file.seekg(0).read(bytes.data(), size);
@@ -146,14 +148,8 @@ Result<cv::Mat> decodeDepthFile(const std::string& path) {
 }
 
 int usedBits(const std::string& path) {
-  if (!std::filesystem::is_regular_file(path))
-    return 16;  // otherwise OpenCV prints an error to stderr
-  if (hasEightBits(headOf(path))) return 16;
-  try {
-    return bitsOf(cv::imread(path, kSixteenGrey));
-  } catch (const cv::Exception&) {
-    return 16;
-  }
+  // OpenCV prints an error if it cannot open a file, so it gets the bytes.
+  return hasEightBits(headOf(path)) ? 16 : usedBitsIn(textOf(path));
 }
 
 int usedBitsIn(std::string_view bytes) {

@@ -1,11 +1,12 @@
 #include "tools/evaluate/simulated_truth.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <limits>
 
 #include "common/base/errors.h"
 #include "common/math/so3.h"
-#include "common/replay/dataset.h"
 #include "common/types/objects.h"
 
 namespace perdure::tools {
@@ -98,6 +99,17 @@ double SimulatedTruth::frameInterval() const {
 
 bool isSimulated(const std::filesystem::path& folder) { return sim::hasTruth(folder); }
 
+std::string lackOfTruth(const std::filesystem::path& folder, const replay::Dataset& dataset) {
+  const char* file = !dataset.truth() ? "mav0/state_groundtruth_estimate0/data.csv"
+                     : !std::filesystem::exists(folder / "visibility_truth.csv")
+                         ? "visibility_truth.csv"
+                         : nullptr;
+  if (!file) return {};
+  return fmt::format(
+      "{} lacks {}, a part of the truth; make the folder again with perdure simulate",
+      folder.c_str(), file);
+}
+
 SimulatedTruth readSimulatedTruth(const std::filesystem::path& folder) {
   if (!isSimulated(folder)) {
     throw StartupError(ExitCode::kUnavailable,
@@ -106,12 +118,8 @@ SimulatedTruth readSimulatedTruth(const std::filesystem::path& folder) {
                            "--out` made, or with --sequence a root of KITTI tracking");
   }
   const auto dataset = replay::Dataset::open({.path = folder, .decode = false});
-  if (!dataset->truth()) {
-    throw StartupError(ExitCode::kUnavailable,
-                       folder.string() +
-                           " lacks mav0/state_groundtruth_estimate0/data.csv, the body's exact "
-                           "states; make the folder anew with perdure simulate");
-  }
+  if (const auto lack = lackOfTruth(folder, *dataset); !lack.empty())
+    throw StartupError(ExitCode::kUnavailable, lack);
   SimulatedTruth truth{sim::readTruth(folder),
                        *dataset->truth(),
                        CameraModel(dataset->calibration().cameras.front()),

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/camera/camera_model.h"
+#include "common/replay/dataset.h"
 #include "common/replay/files/pose_file.h"
 #include "common/sim/truth.h"
 #include "tools/evaluate/object_rows.h"
@@ -24,6 +25,8 @@ struct SimulatedTruth {
 };
 
 bool isSimulated(const std::filesystem::path& folder);
+/// Returns a sentence with the file of the truth that a simulated folder lacks, or "".
+std::string lackOfTruth(const std::filesystem::path& folder, const replay::Dataset& dataset);
 /// Throws StartupError(kUnavailable) with the missing file and the fix if the folder is incomplete.
 SimulatedTruth readSimulatedTruth(const std::filesystem::path& folder);
 

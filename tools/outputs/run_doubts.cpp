@@ -91,10 +91,13 @@ Doubts doubtsOfRun(const RunFacts& facts) {
       {"declared_rates", "sensor rates differ from the declared ones"},
       {"imu_covers_part", "images lie outside of the inertial samples"},
       {"images_frozen", "the images do not change"},
+      {"images_denied", "images may not be read"},
       {"images_repeated", "images are repeated"},
       {"lines_lost", "lines of the recording were not used"},
       {"boxes_beyond", "boxes of other frames were not used"},
-      {"boxes_outside", "boxes may be of images of another size"},
+      {"boxes_of_part", "boxes may have wrong frame numbers"},
+      {"boxes_outside", "boxes do not fit the size of the images"},
+      {"classes_unknown", "classes of boxes are not known"},
       {"imu_repeats", "the IMU repeats one sample"},
       {"poses_", "the poses contradict the drive"}};
   for (const auto& finding : facts.findings) {

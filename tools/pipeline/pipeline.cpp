@@ -7,6 +7,7 @@
 #include "common/base/errors.h"
 #include "services/map_store/core/graph/graph_answer.h"
 #include "tools/evaluate/simulated_truth.h"
+#include "tools/outputs/box_motion.h"
 #include "tools/outputs/pictures/overlay_video.h"
 #include "tools/outputs/pictures/truth_sources.h"
 #include "tools/pipeline/instances.h"
@@ -243,6 +244,8 @@ void Pipeline::finish() {
     outputs_->setInMap(in_map_->finish(map_->mapper(), outputs_->history().lastBeliefs()));
   }
   outputs_->finish();
+  if (const auto& cameras = dataset_->calibration().cameras; !cameras.empty())
+    box_doubt_ = doubtOfBoxes(outputs_->log().frames(), cameras.front());
   if (graph_waits_) {
     askForGraph();
     map_->work();

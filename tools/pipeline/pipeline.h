@@ -17,6 +17,7 @@
 #include "common/replay/recordings/recording_writer.h"
 #include "services/inference/node.h"
 #include "services/semantic_filter/node.h"
+#include "services/semantic_filter/priors.h"
 #include "services/vio/known_pose_node.h"
 #include "services/vio/node.h"
 #include "tools/calibrate/rig_check.h"
@@ -101,6 +102,7 @@ class Pipeline {
   // These functions are in pipeline_checks.cpp.
   void checkData();
   void checkDetectionFile();
+  void checkClasses(const semantic_filter::ClassPriors& priors);
   void refuseUnwritten() const;
   // These functions are in pipeline_recorded.cpp.
   void checkRecorded();
@@ -132,6 +134,7 @@ class Pipeline {
   std::unique_ptr<replay::Dataset> dataset_;
   replay::DataFindings findings_;
   std::unique_ptr<OutputWriter> outputs_;
+  std::optional<Doubt> box_doubt_;             ///< boxes that move otherwise than objects at rest
   std::map<std::string, ShapePoints> shapes_;  ///< shapes of the class priors
   std::unique_ptr<replay::RecordingWriter> run_;
   std::int64_t run_ns_ = 0;

@@ -6,11 +6,14 @@
 #include <map>
 #include <set>
 
+#include "common/base/algorithms/nearest_word.h"
 #include "common/base/checked_file.h"
 #include "common/base/errors.h"
+#include "common/replay/files/text_file.h"
 #include "services/vio/cameras.h"
 #include "tools/data_check/data_check.h"
 #include "tools/data_check/poses/pose_check.h"
+#include "tools/evaluate/simulated_truth.h"
 #include "tools/pipeline/pipeline.h"
 
 namespace perdure::tools {
@@ -48,11 +51,81 @@ std::string fixOfStart(const ReasonCounts& reasons) {
   return "`perdure doctor --data` says more, and the README of vio what the reasons mean";
 }
 
+/// Returns n if the boxes are numbered without gaps up to an n-th of the drive's last frame, as
+/// those of a detector that saw each n-th frame. Otherwise returns 1.
+std::uint64_t framesOfEachBox(const replay::DetectionFile& file, std::uint64_t last) {
+  constexpr std::uint64_t kLeast = 20, kOfFrames = 20;  // tolerates one frame in 20 without a box
+  const std::uint64_t end = file.lastFrame();
+  if (end < kLeast || end > last) return 1;
+  std::uint64_t without = 0;
+  for (std::uint64_t frame = 0; frame <= end; ++frame) {
+    const auto boxes = file.at(frame);
+    without += !boxes || boxes->empty() ? 1 : 0;
+  }
+  if (kOfFrames * without > end) return 1;
+  for (const std::uint64_t n : {2, 3, 4, 5, 10}) {
+    if (n * end <= last && last < n * (end + 1)) return n;
+  }
+  return 1;
+}
+
+/// Adds warnings about boxes that can be used. The drive's frames are `first` to `last`.
+void warnOfBoxes(const replay::DetectionFile& file, const std::string& name, std::uint64_t first,
+                 std::uint64_t last, replay::DataFindings& findings) {
+  const auto warn = [&](const char* code, const std::string& text) {
+    findings.push_back({replay::DataFinding::Grade::kWarning, code, name + ": " + text});
+  };
+  if (!file.note().empty()) warn("boxes_from_one", file.note());
+  if (const std::string why = file.whyBeyond(); !why.empty()) {
+    warn("boxes_outside", why);
+  }
+  if (const std::uint64_t times = framesOfEachBox(file, last); times > 1) {
+    warn("boxes_of_part",
+         fmt::format("its boxes are of all frames from 0 to {}, those of the drive are 0 … {}: if "
+                     "the detector saw one frame in {}, multiply the numbers by {}",
+                     file.lastFrame(), last, times, times));
+  }
+  if (const std::size_t beyond = file.rowsBeyond(last); beyond > 0) {
+    warn("boxes_beyond", fmt::format("{} of {} boxes are of frames that this drive ({} … {}) does "
+                                     "not have and were left out; see whether they are of it",
+                                     beyond, file.rows(), first, last));
+  }
+}
+
 /// Reasons of the map store after which data are missing in its file.
 const std::set<std::string> kUnwritable{"disk_full", "io_error", "read_only", "cannot_open",
                                         "database_error"};
 
 [[noreturn]] void refuse(const std::string& what) { throw StartupError(ExitCode::kData, what); }
+
+/// Throws StartupError with the likely cause why no box became an object. `moved` is the largest
+/// distance of a pose from the first one, in metres.
+[[noreturn]] void refuseEmptyMap(const PipelineCounts& counts,
+                                 const std::optional<Doubt>& box_doubt, double moved) {
+  if (counts.detections == 0) {
+    refuse(
+        fmt::format("nothing was detected in {} frames, so the map is empty: does the network (or "
+                    "file) know what is in the images?",
+                    counts.frames));
+  }
+  if (box_doubt) {
+    refuse(fmt::format("{} detections in {} frames made no object: {}: {}", counts.detections,
+                       counts.frames, box_doubt->what, box_doubt->fix));
+  }
+  constexpr double kMoved_m = 1.0;
+  if (moved < kMoved_m) {
+    refuse(
+        fmt::format("{} detections in {} frames made no object, so the map is empty: by its "
+                    "poses the camera moved by {:.2g} m, from which no distance is known; give "
+                    "a part of the drive in which it moves, or see the poses",
+                    counts.detections, counts.frames, moved));
+  }
+  refuse(fmt::format(
+      "{} detections in {} frames made no object, so the map is empty: do they belong to "
+      "these frames, are they of known classes, and does the camera move past what they "
+      "show?",
+      counts.detections, counts.frames));
+}
 
 }  // namespace
 
@@ -67,6 +140,11 @@ void Pipeline::checkData() {
       findings_.push_back({replay::DataFinding::Grade::kWarning, "camera_unknown",
                            unknown + "; set vio.input.cameras to these"});
     }
+  }
+  if (isSimulated(options_.data)) {
+    if (const auto lack = lackOfTruth(options_.data, *dataset_); !lack.empty())
+      findings_.push_back({replay::DataFinding::Grade::kWarning, "truth_incomplete",
+                           lack + "; the report has no scores"});
   }
   replay::refuseFatal(findings_, options_.data);
   if (!pose_file_) return;
@@ -119,19 +197,28 @@ void Pipeline::checkDetectionFile() {
   if (const std::string why = detection_file_->whyOutside(); !why.empty()) {
     refuse(options_.detections + ": " + why);
   }
-  const auto warn = [&](const char* code, const std::string& text) {
-    findings_.push_back(
-        {replay::DataFinding::Grade::kWarning, code, options_.detections + ": " + text});
-  };
-  if (!detection_file_->note().empty()) warn("boxes_from_one", detection_file_->note());
-  if (const std::string why = detection_file_->whyBeyond(); !why.empty()) {
-    warn("boxes_outside", why);
+  warnOfBoxes(*detection_file_, options_.detections, first, last, findings_);
+}
+
+/// Warns of classes without a prior, whose objects get the broad fallback.
+void Pipeline::checkClasses(const semantic_filter::ClassPriors& priors) {
+  std::vector<std::string> known;
+  for (const auto& prior : priors.classes) known.push_back(prior.name);
+  std::string names;
+  for (const auto& [name, rows] : detection_file_->classCounts()) {
+    if (std::ranges::find(known, name) != known.end() || name == priors.other.name) continue;
+    const std::string near = nearestWord(name, known);
+    names += fmt::format("{}{} ({} boxes{})", names.empty() ? "" : ", ", name, rows,
+                         replay::parseNumber(name) ? ", a number: write the name"
+                         : near.empty()            ? std::string()
+                                                   : "; do you mean " + near + "?");
   }
-  if (const std::size_t beyond = detection_file_->rowsBeyond(last); beyond > 0) {
-    warn("boxes_beyond", fmt::format("{} of {} boxes are of frames that this drive ({} … {}) does "
-                                     "not have and were left out; see whether they are of it",
-                                     beyond, detection_file_->rows(), first, last));
-  }
+  if (names.empty()) return;
+  findings_.push_back(
+      {replay::DataFinding::Grade::kWarning, "classes_unknown",
+       fmt::format("{}: no size is known of the class {}; known are {}; add others to {}",
+                   options_.detections, names, fmt::join(known, ", "),
+                   configs_.semantic_filter.class_priors)});
 }
 
 void Pipeline::refuseUnwritten() const {
@@ -165,6 +252,7 @@ Doubts Pipeline::doubts() const {
         doubts.push_back({"the rig, or an axis of the IMU, does not fit the run", judgement.text});
     }
   }
+  if (box_doubt_) doubts.push_back(*box_doubt_);
   if (!options_.map.empty() && map_->reasons().of("relocalised") == 0) {
     doubts.push_back({"this run was not found on the given map",
                       "its objects are new ones beside those of the map; it is another place, or "
@@ -203,26 +291,7 @@ void Pipeline::refuseNothing() const {
   // Objects existed during the run, so an empty map at the end is no fault of the data.
   const ObjectHistory& history = outputs_->history();
   if (!history.lastBeliefs().empty() || !history.inst().empty()) return;
-  if (counts_.detections == 0) {
-    refuse(
-        fmt::format("nothing was detected in {} frames, so the map is empty: does the network (or "
-                    "file) know what is in the images?",
-                    counts_.frames));
-  }
-  const double moved = wayOf(outputs_->poses());
-  constexpr double kMoved_m = 1.0;
-  if (moved < kMoved_m) {
-    refuse(
-        fmt::format("{} detections in {} frames made no object, so the map is empty: by its "
-                    "poses the camera moved by {:.2g} m, from which no distance is known; give "
-                    "a part of the drive in which it moves, or see the poses",
-                    counts_.detections, counts_.frames, moved));
-  }
-  refuse(fmt::format(
-      "{} detections in {} frames made no object, so the map is empty: do they belong to "
-      "these frames, are they of known classes, and does the camera move past what they "
-      "show?",
-      counts_.detections, counts_.frames));
+  refuseEmptyMap(counts_, box_doubt_, wayOf(outputs_->poses()));
 }
 
 }  // namespace perdure::tools

@@ -82,6 +82,7 @@ InstanceId Pipeline::instanceOf(InstanceId service) const {
 void Pipeline::openFilter() {
   const auto priors = semantic_filter::loadPriors(configs_.semantic_filter);
   shapes_ = semantic_filter::shapePoints(priors);
+  if (detection_file_) checkClasses(priors);
   semantic_filter::Outputs sinks;
   sinks.objects = [this](const Objects& objects) {
     ++counts_.objects;
@@ -194,9 +195,11 @@ void Pipeline::openOdometry(const PipelineOptions& options) {
     return openKnownPoses();
   }
   if (!dataset_->calibration().imu) {
-    throw StartupError(ExitCode::kUnavailable, options.data +
-                                                   " has no inertial samples, which vio "
-                                                   "needs; give --odometry a pose file");
+    std::string notes;
+    for (const std::string& note : dataset_->recording().notes) notes += note + "; ";
+    throw StartupError(ExitCode::kUnavailable,
+                       "{} has no inertial samples, which vio needs; {}give --odometry a pose file",
+                       options.data, notes);
   }
   vio::Outputs sinks;
   sinks.odometry = [this](const Odometry& odometry) {

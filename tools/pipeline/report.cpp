@@ -99,7 +99,7 @@ Json makeReport(const Pipeline& pipeline, const PipelineOptions& options) {
   const bool has_truth =
       pipeline.dataset().kind() == replay::DatasetKind::kKittiTracking && fs::exists(labels);
   if (pipeline.outputs().odometryFrames() == 0) return report;
-  if (isSimulated(options.data))
+  if (isSimulated(options.data) && lackOfTruth(options.data, pipeline.dataset()).empty())
     report["objects"] = reportSimulated(options.data, options.out, usedFrames(pipeline));
   if (has_truth) {
     report["objects"] = objectScore(options, labels, usedFrames(pipeline));

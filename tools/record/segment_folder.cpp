@@ -3,12 +3,12 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <linux/magic.h>
-#include <sys/resource.h>
 #include <sys/statfs.h>
 #include <sys/statvfs.h>
 
 #include <charconv>
 
+#include "common/base/checked_file.h"
 #include "common/base/errors.h"
 #include "common/replay/recordings/mcap_reader.h"
 
@@ -79,10 +79,8 @@ void SegmentFolder::keepQuota() {
 std::uint64_t SegmentFolder::largestFile() const {
   constexpr std::uint64_t kLargestOfFat = 0xFFFF'FFFF;
   struct statfs disk {};
-  rlimit limit{};
   const bool fat = statfs(folder_.c_str(), &disk) == 0 && disk.f_type == MSDOS_SUPER_MAGIC;
-  getrlimit(RLIMIT_FSIZE, &limit);  // RLIM_INFINITY is the largest number
-  return std::min<std::uint64_t>(fat ? kLargestOfFat : UINT64_MAX, limit.rlim_cur);
+  return std::min(fat ? kLargestOfFat : UINT64_MAX, fileSizeLimit().value_or(UINT64_MAX));
 }
 
 bool SegmentFolder::hasRoomFor(std::uint64_t bytes) const {

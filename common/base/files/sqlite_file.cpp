@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 #include <sqlite3.h>
-#include <sys/resource.h>
 
 #include <array>
 #include <cstring>
 #include <fstream>
 
+#include "common/base/checked_file.h"
 #include "common/base/files/access.h"
 #include "common/base/files/folder_lock.h"
 
@@ -75,10 +75,8 @@ std::string sqliteError(sqlite3* connection, int code) {
   const int cause = connection != nullptr ? sqlite3_system_errno(connection) : 0;
   if (cause != 0) text += std::string(": ") + std::strerror(cause);
   // SQLite does not keep the system's cause of each error.
-  rlimit limit{};
-  if (getrlimit(RLIMIT_FSIZE, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY) {
-    text += fmt::format("; files are limited to {} bytes (ulimit -f)", limit.rlim_cur);
-  }
+  if (const auto limit = fileSizeLimit())
+    text += fmt::format("; files are limited to {} bytes (ulimit -f)", *limit);
   return text;
 }
 

@@ -43,7 +43,9 @@ void refuseForeign(const SensorFile& file, const std::string& path) {
       ExitCode::kData, "{} is no rig file: it has none of the sections cam0, cam1 and imu0{}; {}",
       path, maker.empty() ? "" : " and is " + maker,
       imported ? "`perdure calibrate import " + path + " --out rig.yaml` makes one of it"
-               : "write them with the keys of EuRoC's sensor.yaml, or use `perdure calibrate`");
+               : "write them with the keys of EuRoC's sensor.yaml, or use `perdure calibrate`. "
+                 "`perdure pipeline --rig auto` finds a rig "
+                 "from the motion");
 }
 
 }  // namespace
@@ -62,6 +64,8 @@ std::string makerOf(const SensorFile& file) {
       {"cameras", "of Spectacular AI, OKVIS or maplab (not imported)"},
       {"relative_config_imucam", "of OpenVINS, which names the files to give (not imported)"},
       {"target_type", "Kalibr's description of a board (not imported)"},
+      {"cameraData", "of DepthAI (OAK) (not imported)"},
+      {"ppx", "of librealsense (not imported)"},
       {"gyroscope_noise_density", "an IMU's alone, without its cameras"},
       {"intrinsics", "one camera's"},
       {"camera_matrix", "ROS' camera_info"}};

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <sstream>
 
 #include "common/base/errors.h"
 #include "common/math/so3.h"
@@ -18,6 +19,41 @@ const char* nameOf(DistortionModel model) {
   return model == DistortionModel::kEquidistant ? "equidistant" : "radial-tangential";
 }
 
+/// Refuses files that other programs write and that are not YAML. `line` is the first line.
+void refuseOtherFormats(const std::string& name, std::string_view line) {
+  const auto isBinary = [](char c) { return c >= 0 && c < ' ' && c != '\t' && c != '\r'; };
+  const bool wide = line.starts_with("\xFF\xFE") || line.starts_with("\xFE\xFF");  // UTF-16
+  const char* what =
+      line.starts_with("Calibration results") || line.starts_with("Camera-system parameters")
+          ? "Kalibr's report for readers; give the camchain-imucam yaml that Kalibr writes beside "
+            "it"
+      : line.starts_with("# Camera list with one line of data per camera")
+          ? "COLMAP's cameras.txt, which has no pose on the body; write a yaml with the section "
+            "cam0: camera_model: pinhole, intrinsics: [fx, fy, cx, cy], distortion_model: "
+            "radial-tangential, distortion_coefficients: [k1, k2, p1, p2] (its model OPENCV), "
+            "resolution and T_BS, or use `perdure calibrate`"
+      : line.starts_with("\xFF\xD8") ? "a JPEG image; give the yaml of the calibration"
+      : line.starts_with("\x89PNG")  ? "a PNG image; give the yaml of the calibration"
+      : !wide && std::ranges::any_of(line, isBinary) ? "no text; give the yaml of the calibration"
+                                                     : nullptr;
+  if (what) throw StartupError(ExitCode::kData, "{} is {}", name, what);
+}
+
+/// Returns the error of the YAML reader with its place, and the cause if it is a tab.
+std::string faultOf(const YAML::Exception& error, const std::string& name,
+                    const std::string& text) {
+  std::istringstream lines(text);
+  std::string line;
+  for (int number = 1; std::getline(lines, line); ++number) {
+    const auto indent = line.substr(0, line.find_first_not_of(" \t"));
+    if (indent.find('\t') == std::string::npos) continue;
+    return fmt::format("{}:{}: the line is indented with a tab, which YAML forbids; write blanks",
+                       name, number);
+  }
+  return fmt::format("{}:{}:{}: {}; it must be YAML: `key: value` lines, sections indented", name,
+                     error.mark.line + 1, error.mark.column + 1, error.msg);
+}
+
 }  // namespace
 
 SensorFile::SensorFile(const std::filesystem::path& file) : name_(file.string()) {
@@ -25,19 +61,14 @@ SensorFile::SensorFile(const std::filesystem::path& file) : name_(file.string())
   if (!stream) throwMissing(file, "a sensor's calibration", "EuRoC keeps it beside data.csv");
   std::string text, line;
   while (std::getline(stream, line)) {
-    if (text.empty() && line.starts_with("Calibration results")) {
-      throw StartupError(ExitCode::kData,
-                         "{} is Kalibr's report for readers; give the camchain-imucam yaml that "
-                         "Kalibr writes beside it",
-                         name_);
-    }
+    if (text.empty()) refuseOtherFormats(name_, line);
     if (line.starts_with('%')) line.clear();  // OpenCV's "%YAML:1.0" is not valid YAML
     text += line + "\n";
   }
   try {
     root_ = YAML::Load(text);
   } catch (const YAML::Exception& error) {
-    throw StartupError(ExitCode::kData, name_ + ": " + error.what());
+    throw StartupError(ExitCode::kData, faultOf(error, name_, text));
   }
   if (!root_.IsMap()) wrong("the file", "holds no `key: value` lines");
   refuseKeysThatComeTwice();

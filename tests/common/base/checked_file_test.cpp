@@ -75,6 +75,7 @@ TEST_F(CheckedFileTest, ALimitOfTheFileSizeIsNamed) {
   limit.rlim_cur = 1000;
   const auto on_excess = std::signal(SIGXFSZ, SIG_IGN);
   setrlimit(RLIMIT_FSIZE, &limit);
+  EXPECT_EQ(fileSizeLimit(), 1000U);
   std::string message;
   try {
     writeChecked(folder / "result.csv", std::string(1 << 20, 'x'));

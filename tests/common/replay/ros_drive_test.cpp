@@ -290,6 +290,25 @@ TEST(RosDrive, MessagesInAnotherFormatAreNamed) {
               HasSubstr("Image in json, which is not read"));
 }
 
+TEST(RosDrive, JsonInPlaceOfBinaryMessagesIsNamed) {
+  const auto changed = [](const char* change) {
+    const Twin twin = twinOf("ros_json_inside");
+    sqlite3* database = nullptr;
+    EXPECT_EQ(sqlite3_open(twin.file.c_str(), &database), SQLITE_OK);
+    sqlite3_exec(database, change, nullptr, nullptr, nullptr);
+    sqlite3_close(database);
+    return twin;
+  };
+  const Twin all = changed("UPDATE messages SET data = '{\"header\": {}}'");
+  EXPECT_THAT(startupErrorOf([&] { Dataset::open({.path = all.file, .rig = all.rig}); }),
+              HasSubstr("holds JSON text, although"));
+  const Twin imu = changed(
+      "UPDATE messages SET data = '{\"header\": {}}' WHERE topic_id IN (SELECT id FROM topics "
+      "WHERE type = 'sensor_msgs/msg/Imu')");
+  EXPECT_THAT(startupErrorOf([&] { Dataset::open({.path = imu.file, .rig = imu.rig}); }),
+              HasSubstr("imu0 holds JSON text"));
+}
+
 RosTopics topicsOfTypes(std::vector<std::pair<const char*, const char*>> list) {
   RosTopics topics;
   for (const auto& [name, type] : list)

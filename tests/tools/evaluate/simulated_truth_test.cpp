@@ -145,7 +145,8 @@ TEST(SimulatedTruth, AFolderWithoutTruthIsRefusedWithTheFix) {
   EXPECT_EQ(truth.frames.size(), 5U);
   EXPECT_NEAR(truth.frameInterval(), 0.05, 1e-12);
   fs::remove(root / "mav0/state_groundtruth_estimate0/data.csv");
-  EXPECT_THAT(replay::startupErrorOf([&] { readSimulatedTruth(root); }), HasSubstr("exact states"));
+  EXPECT_THAT(replay::startupErrorOf([&] { readSimulatedTruth(root); }),
+              HasSubstr("lacks mav0/state_groundtruth_estimate0/data.csv"));
 }
 
 }  // namespace

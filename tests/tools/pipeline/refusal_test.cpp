@@ -143,6 +143,23 @@ TEST(PipelineRefusal, DetectionsThatCountFromOneAreRefusedAndBoxesBeyondTheDrive
   EXPECT_THAT(pipeline.findings().back().text, HasSubstr("1 of 3 boxes"));
 }
 
+TEST(PipelineRefusal, UnknownClassesAndBoxesOfEachSecondFrameAreSaid) {
+  const auto root = makeTurningDrive("odd_boxes");
+  auto options = optionsFor(root);
+  options.detections = (root / "boxes.csv").string();
+  std::string text = "frame,class,x1,y1,x2,y2,score\n";
+  for (int k = 0; k <= 20; ++k) {
+    text += std::to_string(k) + (k < 20 ? ",2" : ",bicycl") + ",1,2,30,40,0.9\n";
+  }
+  writeText(options.detections, text);
+  const Pipeline pipeline(options);
+  EXPECT_THAT(endOfLine(pipeline.doubts()), AllOf(HasSubstr("classes of boxes are not known"),
+                                                  HasSubstr("boxes may have wrong frame numbers")));
+  EXPECT_THAT(pipeline.findings().back().text,
+              AllOf(HasSubstr("2 (20 boxes, a number: write the name)"),
+                    HasSubstr("bicycl (1 boxes; do you mean bicycle?)")));
+}
+
 /// Twenty poses along x, `step_m` apart.
 std::string posesAlongX(double step_m) {
   std::string poses;

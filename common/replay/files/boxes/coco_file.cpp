@@ -42,6 +42,16 @@ class CocoReader {
     throw StartupError(code, file_.string() + " " + why);
   }
 
+  [[noreturn]] void refuseKeys(const Json& annotation) const {
+    std::string keys;
+    if (annotation.is_object()) {
+      for (const auto& [key, value] : annotation.items()) keys += (keys.empty() ? "" : ", ") + key;
+    }
+    refuse("is not COCO's JSON: its boxes have the keys " + (keys.empty() ? "(none)" : keys) +
+           ", COCO's have image_id, category_id, bbox ([x, y, width, height]) and score; convert "
+           "it, or write a table with the header frame,class,x1,y1,x2,y2,score");
+  }
+
   /// Returns a null value if the member is missing.
   static const Json& memberOf(const Json& object, const char* name) {
     static const Json kNone;
@@ -123,6 +133,7 @@ class CocoReader {
   void take(const Json& annotation, const std::string& name) {
     CocoBox box;
     box.name = name;
+    if (!annotation.contains("image_id")) refuseKeys(annotation);
     const auto image = frames_.find(memberOf(annotation, "image_id").dump());
     box.frame = image != frames_.end() ? image->second : frameOf(annotation, "image_id");
     box.class_name = classOf(memberOf(annotation, "category_id"));

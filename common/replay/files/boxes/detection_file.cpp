@@ -8,6 +8,7 @@
 
 #include "common/base/errors.h"
 #include "common/base/result.h"
+#include "common/replay/files/boxes/foreign_boxes.h"
 #include "common/replay/files/text_file.h"
 
 namespace perdure::replay {
@@ -23,6 +24,8 @@ struct Columns {
   std::optional<std::array<std::size_t, 4>> sigmas;
   std::vector<std::pair<std::size_t, std::string>> logits;
 };
+
+constexpr std::size_t kKitti = 17;  ///< fields of KITTI tracking's labels
 
 Columns readHeader(const std::filesystem::path& file, const TextLine& line,
                    const ClassAliases& aliases) {
@@ -64,11 +67,22 @@ Columns readHeader(const std::filesystem::path& file, const TextLine& line,
   return columns;
 }
 
+/// Returns whether a line is KITTI tracking's: frame, id, type, …, with or without a score.
+bool isKitti(const TextLine& line) {
+  const auto fields = split(line.text, ' ');
+  return (fields.size() == kKitti || fields.size() == kKitti + 1) && !parseNumber(fields[2]);
+}
+
 Columns headerlessColumns(const TextLine& line) {
   constexpr std::size_t kRrc = 6, kLeastOfMot = 7, kMostOfMot = 10;
   Columns columns;
   columns.separator = separatorOf(line.text);
   columns.count = split(line.text, columns.separator).size();
+  if (isKitti(line)) {
+    columns.class_name = 2, columns.score = kKitti;
+    columns.x1 = 6, columns.y1 = 7, columns.x2 = 8, columns.y2 = 9;
+    return columns;
+  }
   columns.mot = columns.count >= kLeastOfMot && columns.count <= kMostOfMot;
   if (!columns.mot) columns.count = kRrc;
   const std::size_t x1 = columns.mot ? 2 : 1;
@@ -77,87 +91,18 @@ Columns headerlessColumns(const TextLine& line) {
   return columns;
 }
 
-/// Refuses files that are no tables. `text` is the first line.
-void refuseForeign(const std::filesystem::path& file, std::string_view text) {
-  const char* what =
-      text.starts_with('<') ? "XML, as of CVAT or Pascal VOC; export the boxes as COCO JSON"
-      : text.starts_with("PK\x03\x04") ? "a ZIP archive or a spreadsheet; save the table as CSV"
-                                       : nullptr;
-  const auto isBinary = [](char c) { return c >= 0 && c < ' ' && c != '\t' && c != '\r'; };
-  if (!what && std::ranges::any_of(text, isBinary)) {
-    throw StartupError(ExitCode::kData,
-                       "{} is no text; give a table of boxes, or a network as --detections model "
-                       "--model FILE",
-                       file.c_str());
-  }
-  if (!what) return;
-  throw StartupError(ExitCode::kData,
-                     "{} is {}, or write a table with the header frame,class,x1,y1,x2,y2,score",
-                     file.c_str(), what);
-}
-
-/// Refuses lines in which all numbers after the first one or two lie between 0 and 1.
-void refuseShareLines(const std::filesystem::path& file, const std::vector<TextLine>& lines) {
-  if (lines.empty()) return;
-  const char separator = separatorOf(lines.front().text);
-  bool fraction = false;
-  for (const TextLine& line : lines) {
-    const auto v = parseNumbers(split(line.text, separator));
-    if (!v || v->size() < 5) return;
-    for (std::size_t i = v->size() > 6 ? 2 : 1; i < v->size(); ++i) {
-      if ((*v)[i] < 0.0 || (*v)[i] > 1.0) return;
-      fraction = fraction || ((*v)[i] > 0.0 && (*v)[i] < 1.0);
-    }
-  }
-  if (!fraction) return;
-  throw StartupError(
-      ExitCode::kData,
-      "{}: its lines have no header and numbers from 0 to 1, which are shares of the image, as in "
-      "YOLO's label files (class, x and y of the centre, width, height); write a header "
-      "frame,class,x1,y1,x2,y2,score and corners in pixels",
-      file.c_str());
-}
-
-/// Refuses lines with corners instead of MOT's width and height, or with corners from the second
-/// column on. Small coordinates fit both formats; they are accepted as MOT's if all boxes then lie
-/// inside the image.
-void refuseCorners(const DetectionFileOptions& options, const std::vector<TextLine>& lines,
-                   char separator) {
-  constexpr std::size_t kLeast = 3;
-  constexpr double kBorder = 2.0;  // px
-  std::size_t from_second = 0, from_third = 0;
-  bool inside = options.width > 0.0;
-  for (const TextLine& line : lines) {
-    const auto v = parseNumbers(split(line.text, separator));
-    if (!v || v->size() < 7) return;
-    const auto isBox = [&](std::size_t i) {
-      return (*v)[i] < (*v)[i + 2] && (*v)[i + 1] < (*v)[i + 3];
-    };
-    from_second += isBox(1) && (*v)[5] >= 0.0 && (*v)[5] <= 1.0 ? 1 : 0;
-    from_third += isBox(2) ? 1 : 0;
-    inside = inside && (*v)[2] + (*v)[4] < options.width + kBorder &&
-             (*v)[3] + (*v)[5] < options.height + kBorder;
-  }
-  const bool second = from_second == lines.size();
-  if (!second && (lines.size() < kLeast || from_third < lines.size() || inside)) return;
-  throw StartupError(
-      ExitCode::kData,
-      "{}: its lines have no header and corners in columns {}, not MOT's id, x, y, width, height; "
-      "write a header frame,class,x1,y1,x2,y2,score and these columns",
-      options.file.c_str(), second ? "2 to 5 with a score behind them" : "3 to 6");
-}
-
 /// Writes the numbers into `row`. Returns the error in them, or an empty string.
 std::string fillBox(const Box& box, double score, const DetectionFileOptions& options,
                     DetectionFile::Row& row) {
   if (box.x2 <= box.x1 || box.y2 <= box.y1) {
-    return "x1 < x2 and y1 < y2: corners, not a corner and a size";
+    return "x1 < x2 and y1 < y2: corners in this order, not a corner or a centre with a size";
   }
   if (!(score >= 0 && score <= 1)) return "score is a number from 0 to 1";
   const double o = options.box_origin;
   row.detection.box = Box{box.x1 - o, box.y1 - o, box.x2 - o, box.y2 - o};
   const double clipped = std::clamp(score, options.score_floor, 1.0 - options.score_floor);
   row.logit = std::log(clipped / (1.0 - clipped));
+  row.score = score;
   return {};
 }
 
@@ -165,7 +110,8 @@ std::string fillBox(const std::vector<std::string_view>& fields, const Columns& 
                     const DetectionFileOptions& options, DetectionFile::Row& row) {
   const auto x1 = parseNumber(fields[columns.x1]), y1 = parseNumber(fields[columns.y1]);
   const auto x2 = parseNumber(fields[columns.x2]), y2 = parseNumber(fields[columns.y2]);
-  const auto score = parseNumber(fields[columns.score]);
+  const bool scored = columns.score < fields.size();  // labels are certain
+  const auto score = scored ? parseNumber(fields[columns.score]) : 1.0;
   if (!score && fields[columns.score].find(',') != std::string_view::npos) {
     return std::string(fields[columns.score]) + " has a decimal comma; write a point";
   }
@@ -231,12 +177,21 @@ bool isHeaderless(const std::vector<TextLine>& lines, const DetectionFileOptions
         options.file.string() + " is empty; it begins with a header frame,class,x1,y1,x2,y2,score");
   }
   if (!parseNumber(fieldsOf(lines[0].text)[0])) return false;
+  if (isKitti(lines[0])) return true;
   if (options.class_name.empty()) {
     throw StartupError(ExitCode::kUsage, options.file.string() +
                                              " has no header: say the class of its boxes with "
                                              "--class (for example --class Car)");
   }
   return true;
+}
+
+/// Returns the number of a frame that is given by its number or by the name of its image.
+std::optional<std::int64_t> frameOf(std::string_view field,
+                                    const std::map<std::string, std::uint64_t>& numbers) {
+  const auto named = numbers.find(std::filesystem::path(field).stem().string());
+  if (named != numbers.end()) return static_cast<std::int64_t>(named->second);
+  return parseInteger(field);
 }
 
 using NumberedRow = std::pair<std::uint64_t, DetectionFile::Row>;
@@ -250,7 +205,7 @@ Result<NumberedRow> readRow(const std::string& text, const Columns& columns,
                     " are expected (frame,x1,y1,x2,y2,score without a header; MOT's lines have 7 "
                     "to 10)");
   }
-  auto frame = parseInteger(fields[columns.frame]);
+  auto frame = frameOf(fields[columns.frame], options.numbers);
   if (frame && columns.mot) --*frame;
   if (!frame || *frame < 0) {
     return fail("detection_malformed", "frame is a whole number from {}", columns.mot ? 1 : 0);
@@ -269,6 +224,7 @@ Result<NumberedRow> readRow(const std::string& text, const Columns& columns,
 
 DetectionFile DetectionFile::read(const DetectionFileOptions& options,
                                   const ClassAliases& aliases) {
+  refuseFolder(options);
   const auto lines =
       readLines(options.file, "--detections takes `model`, `none` or a file of boxes");
   DetectionFile result;
@@ -301,16 +257,16 @@ void DetectionFile::takeCoco(const CocoBoxes& coco, const ClassAliases& aliases)
 
 void DetectionFile::takeLines(const std::vector<TextLine>& lines, const ClassAliases& aliases) {
   const DetectionFileOptions& options = options_;
-  if (!lines.empty()) refuseForeign(options.file, lines[0].text);
-  refuseShareLines(options.file, lines);
+  refuseForeign(options.file, lines);
   const bool headerless = isHeaderless(lines, options);
   const Columns columns =
       headerless ? headerlessColumns(lines[0]) : readHeader(options.file, lines[0], aliases);
-  if (columns.mot) refuseCorners(options, lines, columns.separator);
+  if (columns.mot) refuseCorners(options, lines);
   for (const auto& [column, name] : columns.logits) logit_classes_.push_back(name);
   Complaints wrong(options.file);
   for (std::size_t i = headerless ? 0 : 1; i < lines.size(); ++i) {
     const auto row = readRow(lines[i].text, columns, options, aliases);
+    if (row && row->second.class_name == "dontcare") continue;  // KITTI: no statement
     if (row) {
       rows_[row->first].push_back(row->second);
     } else {
@@ -318,21 +274,39 @@ void DetectionFile::takeLines(const std::vector<TextLine>& lines, const ClassAli
     }
   }
   wrong.throwIfAny();
-  if (headerless) first_seen_.emplace_back(0, aliases.canonical(options.class_name));
+  if (headerless && !columns.class_name)
+    first_seen_.emplace_back(0, aliases.canonical(options.class_name));
 }
 
-/// Refuses boxes whose sides are shares of the image.
+/// Refuses boxes whose sides are shares or percent of the image, and boxes without any score.
 void DetectionFile::refuseShares() const {
   constexpr double kMost = 1.5;  // shares above 1 belong to boxes that extend beyond the image
-  double most = 0.0;
+  constexpr double kPercent = 101.0, kLeastPercent = 90.0, kLeastSide = 200.0;
+  constexpr std::size_t kLeastRows = 20;
+  double right = 0.0, bottom = 0.0, score = 0.0;
   for (const auto& [frame, rows] : rows_) {
-    for (const Row& row : rows) most = std::max({most, row.detection.box.x2, row.detection.box.y2});
+    for (const Row& row : rows) {
+      right = std::max(right, row.detection.box.x2),
+      bottom = std::max(bottom, row.detection.box.y2);
+      score = std::max(score, row.score);
+    }
   }
-  if (rows_.empty() || most + options_.box_origin > kMost) return;
+  if (rows_.empty()) return;
+  if (score == 0.0 && logit_classes_.empty()) {
+    throw StartupError(ExitCode::kData,
+                       "{}: all scores are 0, which means that no box shows an object; write the "
+                       "network's scores, or 0.9 if it gives none",
+                       options_.file.c_str());
+  }
+  const bool percent = std::max(right, bottom) < kPercent &&
+                       std::min(right, bottom) > kLeastPercent && rows() >= kLeastRows &&
+                       std::min(options_.width, options_.height) > kLeastSide;
+  if (std::max(right, bottom) + options_.box_origin > kMost && !percent) return;
   throw StartupError(ExitCode::kData,
-                     "{}: no side of a box is beyond {} px, so the numbers are shares of the "
-                     "image; multiply x1, x2 by its width and y1, y2 by its height",
-                     options_.file.c_str(), most + options_.box_origin);
+                     "{}: no side of a box is beyond {} px, so the numbers are {} of the image; "
+                     "multiply x1, x2 by its width and y1, y2 by its height{}",
+                     options_.file.c_str(), std::max(right, bottom) + options_.box_origin,
+                     percent ? "percent" : "shares", percent ? ", and divide by 100" : "");
 }
 
 std::string DetectionFile::whyOutside() const {
@@ -348,12 +322,49 @@ std::string DetectionFile::whyOutside() const {
     }
   }
   if (options_.width == 0.0 || 4 * outside <= rows()) return {};
+  if (isExchanged(right, bottom)) return exchanged(right, bottom);
   const bool thousandths = std::max(right, bottom) <= kThousandth;
   return fmt::format(
       "the centres of {} of {} boxes lie outside of the images ({}x{}); boxes reach to {:.0f}, "
       "{:.0f}: they are of images of another size{}; give corners in pixels of these images",
       outside, rows(), options_.width, options_.height, right, bottom,
       thousandths ? ", or thousandths of the image" : "");
+}
+
+bool DetectionFile::isExchanged(double right, double bottom) const {
+  const double least = 1.02 * std::min(options_.width, options_.height);
+  const bool wide = options_.width > options_.height, high = options_.width < options_.height;
+  return (wide && right < least && bottom > least) || (high && bottom < least && right > least);
+}
+
+std::string DetectionFile::exchanged(double right, double bottom) const {
+  return fmt::format(
+      "boxes reach to x = {:.0f}, y = {:.0f} in images of {}x{}: x and y are exchanged; "
+      "the columns are x1, y1, x2, y2, with x to the right",
+      right, bottom, options_.width, options_.height);
+}
+
+/// Finds the border at which boxes of other images are cut off: several end exactly there.
+std::string DetectionFile::whyCut(double right, double bottom) const {
+  constexpr double kSame_px = 0.5, kOther = 0.02;
+  constexpr std::size_t kLeast = 5;
+  std::size_t at_right = 0, at_bottom = 0;
+  for (const auto& [frame, rows] : rows_) {
+    for (const Row& row : rows) {
+      at_right += row.detection.box.x2 > right - kSame_px ? 1 : 0;
+      at_bottom += row.detection.box.y2 > bottom - kSame_px ? 1 : 0;
+    }
+  }
+  const double x = (right + 1.0) / options_.width, y = (bottom + 1.0) / options_.height;
+  const bool wide = at_right >= kLeast && x > 1.0 + kOther;
+  const bool high = at_bottom >= kLeast && y > 1.0 + kOther;
+  const bool smaller = at_right >= kLeast && at_bottom >= kLeast && x < 1.0 - kOther &&
+                       y < 1.0 - kOther && std::abs(x - y) < kOther * x;
+  if (!wide && !high && !smaller) return {};
+  return fmt::format(
+      "{} boxes end at x = {:.0f} and {} at y = {:.0f}: these are the borders of other images than "
+      "those of {}x{}; scale the boxes, and subtract the margin of padded images",
+      at_right, right, at_bottom, bottom, options_.width, options_.height);
 }
 
 std::string DetectionFile::whyBeyond() const {
@@ -369,7 +380,10 @@ std::string DetectionFile::whyBeyond() const {
       before += box.x1 < -across || box.y1 < -down ? 1 : 0;
     }
   }
-  if (options_.width == 0.0 || 20 * beyond <= rows() || 10 * before > beyond) return {};
+  if (options_.width == 0.0) return {};
+  const bool few = 20 * beyond <= rows() || 10 * before > beyond;
+  if (!few && isExchanged(right, bottom)) return exchanged(right, bottom);
+  if (const std::string cut = whyCut(right, bottom); few || !cut.empty()) return cut;
   return fmt::format(
       "{} of {} boxes reach beyond the right or lower border of the images ({}x{}), to {:.0f}, "
       "{:.0f}, and {} beyond the left or upper one: they may be of images of another size",
@@ -413,6 +427,14 @@ std::vector<std::string> DetectionFile::classesAt(std::uint64_t frame) const {
     if (first <= frame) classes.push_back(name);
   }
   return classes;
+}
+
+std::map<std::string, std::size_t> DetectionFile::classCounts() const {
+  std::map<std::string, std::size_t> counts;
+  for (const auto& [frame, rows] : rows_) {
+    for (const Row& row : rows) ++counts[row.class_name];
+  }
+  return counts;
 }
 
 std::size_t DetectionFile::rows() const {

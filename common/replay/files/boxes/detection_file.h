@@ -1,8 +1,10 @@
 // Reads detections from a file as evidence: a CSV with the header `frame,class,x1,y1,x2,y2,score`.
+// `frame` is the number of a frame, or the name of its image.
 // Optional columns are an azimuth (its name begins with alpha or azimuth) and `logit:<class>`.
 // Without a header, lines are RRC's `frame,x1,y1,x2,y2,score` or MOT's `frame,id,x,y,width,height,
 // score,…`, whose frames count from 1; the caller then gives the class. Further columns after the
-// corners are refused, because their meaning is not known. COCO's JSON is read too (coco_file.h).
+// corners are refused, because their meaning is not known. KITTI tracking's lines and COCO's JSON
+// (coco_file.h) are read too.
 #pragma once
 
 #include <cstdint>
@@ -65,20 +67,24 @@ class DetectionFile {
   bool hasSizes() const;
   /// A sentence if many boxes lie outside the images. Otherwise "".
   std::string whyOutside() const;
-  /// A sentence if boxes reach beyond the image on one side of it only, as those of larger images
-  /// do. Otherwise "".
+  /// A sentence if boxes reach beyond the image on one side of it only, or if they are cut off at
+  /// other borders, as those of images of another size are. Otherwise "".
   std::string whyBeyond() const;
+  std::map<std::string, std::size_t> classCounts() const;  ///< rows by canonical class name
 
   struct Row {
     Detection detection;     ///< empty until at() sets the activations, if the file has no logits
     std::string class_name;  ///< canonical name
-    double logit = 0.0;
+    double logit = 0.0, score = 0.0;
   };
 
  private:
   void takeCoco(const CocoBoxes& coco, const ClassAliases& aliases);
   void takeLines(const std::vector<TextLine>& lines, const ClassAliases& aliases);
   void refuseShares() const;
+  bool isExchanged(double right, double bottom) const;
+  std::string exchanged(double right, double bottom) const;
+  std::string whyCut(double right, double bottom) const;
   void noteClasses();
   std::vector<std::string> classesAt(std::uint64_t frame) const;
 

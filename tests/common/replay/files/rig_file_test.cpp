@@ -81,6 +81,16 @@ TEST_F(RigFile, SaysWhatIsWrongAndWhere) {
   EXPECT_THAT(complaint("Calibration results\n===\nerror (cam0): mean 0.3\n"),
               testing::HasSubstr("Kalibr's report"));
   EXPECT_THROW(readRig("/nowhere/rig.yaml"), StartupError);
+  EXPECT_THAT(complaint("cam0:\n\tT_BS:\n"),
+              testing::HasSubstr(":2: the line is indented with a tab"));
+  EXPECT_THAT(complaint("cam0: a: b\n"), testing::HasSubstr(".yaml:1:8: illegal map value"));
+  EXPECT_THAT(complaint("Camera-system parameters:\n\tcam0 (/cam0):\n"),
+              testing::HasSubstr("Kalibr's report"));
+  EXPECT_THAT(complaint("# Camera list with one line of data per camera:\n1 OPENCV 320 240\n"),
+              testing::HasSubstr("COLMAP's cameras.txt"));
+  EXPECT_THAT(complaint("\xFF\xD8\xFF\xE0 JFIF\n"), testing::HasSubstr("is a JPEG image"));
+  EXPECT_THAT(complaint("{\"ppx\": 160, \"coeffs\": []}"),
+              testing::AllOf(testing::HasSubstr("librealsense"), testing::HasSubstr("--rig auto")));
 }
 
 TEST_F(RigFile, TakesThePlaceOfADrivesCalibration) {
