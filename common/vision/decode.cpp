@@ -146,8 +146,8 @@ Result<cv::Mat> decodeDepthFile(const std::string& path) {
 }
 
 int usedBits(const std::string& path) {
-  if (!std::filesystem::is_regular_file(path))
-    return 16;  // otherwise OpenCV prints an error to stderr
+  // otherwise OpenCV prints an error to stderr
+  if (!std::filesystem::is_regular_file(path) || !std::ifstream(path)) return 16;
   if (hasEightBits(headOf(path))) return 16;
   try {
     return bitsOf(cv::imread(path, kSixteenGrey));
