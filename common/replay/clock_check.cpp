@@ -324,7 +324,8 @@ DataFinding findingOf(const ClockChange& first, std::size_t count, const std::st
     return {Grade::kFatal, "stamps_are_digits",
             fmt::format("{}: the stamps of {} {} by {} at a full minute: they are the digits of a "
                         "time of day (HHMMSS); convert them to a time that increases evenly, "
-                        "3600 HH + 60 MM + SS",
+                        "3600 HH + 60 MM + SS; if the recording did pause for just that time, cut "
+                        "the drive there",
                         places, sensor, back ? "go back" : "jump ahead", step)};
   }
   if (first.kind == Kind::kJoined) {
