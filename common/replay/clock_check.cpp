@@ -10,6 +10,7 @@
 #include "common/base/algorithms/median.h"
 #include "common/replay/files/stamps.h"
 #include "common/replay/recording.h"
+#include "common/replay/stamp_rhythm.h"
 
 namespace perdure::replay {
 namespace {
@@ -54,7 +55,8 @@ void checkEqual(const char* of, std::uint64_t repeated, std::size_t kept, DataFi
   findings.push_back(
       {unusable ? StampGrade::kFatal : StampGrade::kWarning, "stamps_equal",
        fmt::format("{} of {} stamps of the {} are equal to others: they lost digits (written as "
-                   "float?){}; write them as integers of nanoseconds or with 9 decimals",
+                   "float, or in whole seconds?){}; write them as integers of nanoseconds or with "
+                   "9 decimals",
                    repeated, all, of, unusable ? "" : ", or are those of packets")});
 }
 
@@ -289,6 +291,21 @@ bool endsVio(const ClockChange& pause, const std::vector<ClockChange>& all) {
          (isOfBoth(pause, all) && stepOf(pause) > kBlackout);
 }
 
+/// Explains a step of one sensor, and gives the fix.
+std::string causeOfStep(const ClockChange& step) {
+  if (!isRestart(step)) {
+    return ", those of the other sensors show no such step (their rate is too low, or they have "
+           "another clock): cut the drive there into two";
+  }
+  if (step.after >= TimePoint{} + step.usual) {
+    return ", to their start: the device was restarted; cut the drive there into two";
+  }
+  return fmt::format(
+      ", to their start: a counter of {} wrapped (then add these to all stamps from there on), or "
+      "the device was restarted (then cut the drive there into two)",
+      secondsText(step.added));
+}
+
 /// The finding for `count` changes of a kind. Its text gives the place and the amount of the first.
 DataFinding findingOf(const ClockChange& first, std::size_t count, const std::string& places,
                       bool ends_vio) {
@@ -307,7 +324,8 @@ DataFinding findingOf(const ClockChange& first, std::size_t count, const std::st
     return {Grade::kFatal, "stamps_are_digits",
             fmt::format("{}: the stamps of {} {} by {} at a full minute: they are the digits of a "
                         "time of day (HHMMSS); convert them to a time that increases evenly, "
-                        "3600 HH + 60 MM + SS",
+                        "3600 HH + 60 MM + SS; if the recording did pause for just that time, cut "
+                        "the drive there",
                         places, sensor, back ? "go back" : "jump ahead", step)};
   }
   if (first.kind == Kind::kJoined) {
@@ -330,12 +348,8 @@ DataFinding findingOf(const ClockChange& first, std::size_t count, const std::st
   }
   const bool judged = first.sensor == "imu" || first.sensor == "frame";
   return {judged ? Grade::kFatal : Grade::kWarning, "clock_set_alone",
-          fmt::format("{}: the stamps of {} {} by {}{}: cut the drive there into two", places,
-                      sensor, back ? "go back" : "jump ahead", step,
-                      isRestart(first)
-                          ? ", to their start: a counter wrapped, or the device was restarted"
-                          : ", those of the other sensors show no such step (their rate is "
-                            "too low, or they have another clock)")};
+          fmt::format("{}: the stamps of {} {} by {}{}", places, sensor,
+                      back ? "go back" : "jump ahead", step, causeOfStep(first))};
 }
 
 bool isShort(const ClockChange& pause) {
@@ -483,6 +497,8 @@ DataFindings checkClocks(const Recording& recording, const DataUse& use) {
     return findings;
   }
   checkShared(recording, findings);
+  checkArrival(images, findings);
+  if (checkBursts(imu, findings)) return findings;  // rates would be wrong
   checkRate(recording, findings);
   checkCommonRate(recording, imu, images, findings);
   return findings;

@@ -108,7 +108,8 @@ void checkLost(const Recording& recording, const DataUse& use, DataFindings& fin
                                     lost, kept + lost,
                                     std::string(kind) == "imu" ? "inertial samples" : "images")});
   }
-  const std::uint64_t unlisted = recording.reasons.of("frame_unlisted");
+  const std::uint64_t named = recording.reasons.of("frame_not_increasing"),
+                      unlisted = std::max(named, recording.reasons.of("frame_unlisted")) - named;
   if (kFew * unlisted > images) {
     findings.push_back({Grade::kWarning, "lines_lost",
                         fmt::format("{} images lie in the folder but not in its data.csv and were "
@@ -138,6 +139,46 @@ void checkRepeatedSamples(const std::vector<ImuSample>& samples, DataFindings& f
                    "or its recorder stood still; cut the drive there",
                    toNanoseconds(samples[first].time), toNanoseconds(samples[last].time),
                    toSeconds(samples[last].time - samples[first].time), last - first + 1)});
+}
+
+/// A value of a sample's six.
+double axisValue(const ImuSample& sample, Eigen::Index axis) {
+  return axis < 3 ? sample.gyro[axis] : sample.accel[axis - 3];
+}
+
+/// Adds imu_saturated if an axis stays at its largest value, which it should only touch, while the
+/// others change.
+void checkSaturated(const std::vector<ImuSample>& samples, DataFindings& findings) {
+  constexpr std::size_t kFewestAtMost = 10, kShareAtMost = 200;
+  constexpr double kNear = 0.85, kLeast_rad_s = 0.1;
+  for (Eigen::Index axis = 0; axis < 6; ++axis) {
+    double most = 0.0;
+    for (const auto& sample : samples) most = std::max(most, std::abs(axisValue(sample, axis)));
+    std::size_t at_most = 0, stays = 0, near = 0;
+    for (std::size_t i = 1; i < samples.size(); ++i) {
+      const double value = std::abs(axisValue(samples[i], axis));
+      if (value < most) {
+        near += value > kNear * most ? 1 : 0;
+        continue;
+      }
+      ++at_most;
+      const bool changed = axis < 3 ? samples[i].accel != samples[i - 1].accel
+                                    : samples[i].gyro != samples[i - 1].gyro;
+      stays += changed && std::abs(axisValue(samples[i - 1], axis)) == most ? 1 : 0;
+    }
+    const bool few = at_most < kFewestAtMost || kShareAtMost * at_most < samples.size(),
+               still = axis < 3 && most < kLeast_rad_s;
+    if (few || still || 2 * at_most > samples.size() || 2 * stays < at_most || at_most < near)
+      continue;
+    findings.push_back(
+        {Grade::kWarning, "imu_saturated",
+         fmt::format("the {} reads exactly ±{:.4g} {} about {} in {} samples ({:.0f} %) and never "
+                     "more: it is saturated; set a larger range of the sensor",
+                     axis < 3 ? "gyroscope" : "accelerometer", most, axis < 3 ? "rad/s" : "m/s²",
+                     "xyz"[axis % 3], at_most,
+                     100.0 * static_cast<double>(at_most) / static_cast<double>(samples.size()))});
+    return;
+  }
 }
 
 }  // namespace
@@ -174,7 +215,8 @@ DataFindings checkImuUnits(const std::vector<ImuSample>& samples) {
     findings.push_back(
         {Grade::kWarning, "gyro_scale",
          fmt::format("rates of turn are {:.3g} rad/s (median), more than a turn a "
-                     "second: in degrees per second? Then multiply them by 0.0174533",
+                     "second: are they in degrees per second (then multiply them by 0.0174533), "
+                     "or in thousandths of a degree per second (by 1.74533e-5)?",
                      turn)});
   }
   return findings;
@@ -188,6 +230,7 @@ DataFindings checkData(const Recording& recording, const DataUse& use) {
     const DataFindings units = checkImuUnits(recording.imu);
     findings.insert(findings.end(), units.begin(), units.end());
     checkRepeatedSamples(recording.imu, findings);
+    checkSaturated(recording.imu, findings);
   }
   if (!use.images) return findings;
   if (use.imu) checkUpright(recording, findings);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <optional>
 #include <string>
 
@@ -83,13 +84,9 @@ std::optional<Left> leftBy(const TurnPairs& pairs, const SignedAxes& axes, doubl
   return Left{sum / changed, all / std::max(1e-18, pairs.reference.squaredNorm())};
 }
 
-}  // namespace
-
-replay::DataFindings judgeAxes(const std::vector<Turn>& turns,
-                               const std::vector<ImuSample>& samples,
-                               const CameraCalibration& camera) {
-  constexpr std::size_t kFewest = 12;
-  constexpr double kEnough_px = 0.1, kMuch_px = 2.0;
+/// Rotations by images, in B, and by gyroscope.
+TurnPairs pairsInBody(const std::vector<Turn>& turns, const std::vector<ImuSample>& samples,
+                      const CameraCalibration& camera) {
   const TurnIntegral gyro(samples);
   const Duration later = durationFromSeconds(camera.time_offset_s);
   std::vector<Eigen::Vector3d> images, said;
@@ -98,8 +95,42 @@ replay::DataFindings judgeAxes(const std::vector<Turn>& turns,
     images.push_back(camera.T_BC.q * turn.of_images);
     said.push_back(gyro.between(turn.from + later, turn.to + later));
   }
-  if (images.size() < kFewest) return {};
-  const TurnPairs pairs(images, said);
+  return {images, said};
+}
+
+constexpr std::size_t kFewestPairs = 12;
+
+}  // namespace
+
+replay::DataFindings judgeConstantAxis(const std::vector<Turn>& turns,
+                                       const std::vector<ImuSample>& samples,
+                                       const CameraCalibration& camera) {
+  constexpr double kMuch_px = 1.0;
+  const TurnPairs pairs = pairsInBody(turns, samples, camera);
+  if (pairs.count() < kFewestPairs) return {};
+  Eigen::Vector3d spread = Eigen::Vector3d::Zero();
+  const Eigen::Vector3d first = samples.front().gyro;
+  for (const auto& one : samples) spread = spread.cwiseMax((one.gyro - first).cwiseAbs());
+  if (spread.isZero()) return {};  // gyro_constant
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const double turning_px = camera.fx * std::sqrt(pairs.reference.row(i).squaredNorm() /
+                                                    static_cast<double>(pairs.count()));
+    if (spread[i] > 0.0 || turning_px < kMuch_px) continue;
+    return {{replay::DataFinding::Grade::kFatal, "gyro_axis_constant",
+             fmt::format("the gyroscope's w_{} is {:.4g} rad/s in all {} samples while the images "
+                         "turn about this axis ({:.2g} px from one to the next): it is off, or "
+                         "its column was not recorded",
+                         "xyz"[i], first[i], samples.size(), turning_px)}};
+  }
+  return {};
+}
+
+replay::DataFindings judgeAxes(const std::vector<Turn>& turns,
+                               const std::vector<ImuSample>& samples,
+                               const CameraCalibration& camera) {
+  constexpr double kEnough_px = 0.1, kMuch_px = 2.0;
+  const TurnPairs pairs = pairsInBody(turns, samples, camera);
+  if (pairs.count() < kFewestPairs) return {};
   std::optional<Left> least;
   SignedAxes best;
   for (const SignedAxes& axes : mirroredAxes()) {
@@ -115,7 +146,7 @@ replay::DataFindings judgeAxes(const std::vector<Turn>& turns,
            fmt::format("the images turn as if the gyroscope's axes were others: {} leave {:.0f} % "
                        "of their turning about these axes unexplained, in {} pairs of images: see "
                        "the order and the signs of its columns, or the axes of T_BS",
-                       textOf(best), 100.0 * least->of_changed, images.size())}};
+                       textOf(best), 100.0 * least->of_changed, pairs.count())}};
 }
 
 }  // namespace perdure::tools

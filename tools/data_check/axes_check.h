@@ -15,4 +15,10 @@ replay::DataFindings judgeAxes(const std::vector<Turn>& turns,
                                const std::vector<ImuSample>& samples,
                                const CameraCalibration& camera);
 
+/// Code: gyro_axis_constant. An axis of the gyroscope that never changes although the images turn
+/// about it.
+replay::DataFindings judgeConstantAxis(const std::vector<Turn>& turns,
+                                       const std::vector<ImuSample>& samples,
+                                       const CameraCalibration& camera);
+
 }  // namespace perdure::tools

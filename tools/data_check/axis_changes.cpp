@@ -44,7 +44,6 @@ AxisChanges axisChangesOf(const std::vector<Turn>& turns, const std::vector<ImuS
   return changes;
 }
 
-/// Correlation of each axis of the images (rows) with each axis of the gyroscope (columns).
 Matrix3d correlationOf(const AxisChanges& changes) {
   Matrix3d both = Matrix3d::Zero();
   Vector3d images = Vector3d::Constant(1e-18), gyro = images;
@@ -89,6 +88,13 @@ std::string axesText(const Axes& axes) {
 
 }  // namespace
 
+AxisCorrelation correlationOfAxes(const std::vector<Turn>& turns,
+                                  const std::vector<ImuSample>& samples,
+                                  const CameraCalibration& camera) {
+  const AxisChanges changes = axisChangesOf(turns, samples, camera);
+  return {correlationOf(changes), changes.images.size()};
+}
+
 std::vector<ImuSample> livelinessOfAxes(const std::vector<ImuSample>& samples) {
   constexpr Duration kHalf = std::chrono::milliseconds(250);
   std::vector<ImuSample> lively = samples;
@@ -112,8 +118,8 @@ bool axesSurelyAgree(const std::vector<Turn>& turns, const std::vector<ImuSample
   // With this correlation in a few changes, more of them would hardly show less than kUnseen.
   constexpr double kAgree = 0.5;
   constexpr std::size_t kFew = 30;
-  const AxisChanges changes = axisChangesOf(turns, samples, camera);
-  return changes.images.size() >= kFew && correlationOf(changes).diagonal().minCoeff() > kAgree;
+  const AxisCorrelation found = correlationOfAxes(turns, samples, camera);
+  return found.count >= kFew && found.of.diagonal().minCoeff() > kAgree;
 }
 
 replay::DataFindings judgeAxisChanges(const std::vector<Turn>& turns,
@@ -121,10 +127,9 @@ replay::DataFindings judgeAxisChanges(const std::vector<Turn>& turns,
                                       const CameraCalibration& camera) {
   constexpr double kSurely = 4.0;  // limit, in standard deviations of a chance correlation
   constexpr double kSeen = 0.4;
-  const AxisChanges changes = axisChangesOf(turns, samples, camera);
-  if (changes.images.size() < kFewestChanges) return {};
-  const double chance = 1.0 / std::sqrt(static_cast<double>(changes.images.size()));
-  const Matrix3d correlation = correlationOf(changes);
+  const auto [correlation, count] = correlationOfAxes(turns, samples, camera);
+  if (count < kFewestChanges) return {};
+  const double chance = 1.0 / std::sqrt(static_cast<double>(count));
   Axes axes = bestAxes(correlation);
   bool others = false;
   for (int i = 0; i < 3; ++i) {

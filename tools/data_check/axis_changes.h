@@ -10,6 +10,16 @@ namespace perdure::tools {
 /// values allow a distinction of the axes.
 std::vector<ImuSample> livelinessOfAxes(const std::vector<ImuSample>& samples);
 
+/// Correlation of changes of the rotation rate between images: of each axis of the images in B
+/// (rows) with each axis of the gyroscope (columns).
+struct AxisCorrelation {
+  Eigen::Matrix3d of = Eigen::Matrix3d::Zero();
+  std::size_t count = 0;  ///< number of changes
+};
+AxisCorrelation correlationOfAxes(const std::vector<Turn>& turns,
+                                  const std::vector<ImuSample>& samples,
+                                  const CameraCalibration& camera);
+
 /// Whether each axis of the gyroscope clearly correlates with the same axis of the images. If so,
 /// judgeAxisChanges cannot find a fault.
 bool axesSurelyAgree(const std::vector<Turn>& turns, const std::vector<ImuSample>& samples,

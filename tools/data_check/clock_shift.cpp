@@ -176,10 +176,12 @@ std::optional<double> rateOfTurns(const std::vector<Turn>& turns,
 }
 
 replay::DataFindings rateFinding(double rate, const CameraCalibration& camera) {
-  return {{DataFinding::Grade::kWarning, "clock_rate",
-           fmt::format("the clock of {} runs {:.2g} % too {} for that of the IMU by their turning: "
-                       "see which of them has stamps that are counted or computed by a wrong rate",
-                       camera.name, 100.0 * std::abs(rate), rate < 0.0 ? "fast" : "slow")}};
+  return {
+      {DataFinding::Grade::kWarning, "clock_rate",
+       fmt::format("the clock of {} runs {:.2g} % too {} for that of the IMU by their turning: "
+                   "see which of them has stamps that are counted or computed by a wrong "
+                   "rate; if the images, multiply their times since the first by about {:.4f}",
+                   camera.name, 100.0 * std::abs(rate), rate < 0.0 ? "fast" : "slow", 1.0 + rate)}};
 }
 
 namespace {
@@ -202,13 +204,38 @@ std::optional<double> shiftOfClocks(const Recording& recording) {
   return longShift(turnsAlong(recording), recording);
 }
 
-replay::DataFindings checkClockLine(const Recording& recording) {
+bool areBackwards(const std::vector<Turn>& turns, const std::vector<ImuSample>& samples,
+                  const CameraCalibration& camera, TimePoint first, TimePoint last) {
+  constexpr double kNear_s = 0.3;
+  std::vector<Turn> backwards;
+  for (auto turn = turns.rbegin(); turn != turns.rend(); ++turn) {
+    backwards.push_back({last - (turn->to - first), last - (turn->from - first), -turn->of_images});
+  }
+  const auto shift = shiftOfTurns(backwards, samples, camera);
+  return shift && std::abs(*shift) < kNear_s;
+}
+
+replay::DataFindings checkClockLine(const Recording& recording, std::vector<PartOffset> parts,
+                                    KnownTurns& known) {
   const CameraCalibration& camera = recording.calibration.cameras.front();
-  const auto along = turnsAlong(recording);
+  const auto along = turnsAlong(recording, &known);
   if (const auto shift = longShift(along, recording)) return shiftFinding(*shift, camera);
+  for (const PartOffset& part : offsetsOfParts(along, recording.imu, camera)) parts.push_back(part);
+  if (auto found = judgeParts(std::move(parts), recording); !found.empty()) return found;
   if (const auto rate = rateOfTurns(along, recording.imu, camera))
     return rateFinding(*rate, camera);
   return {};
+}
+
+replay::DataFindings checkBackwards(const Recording& recording, KnownTurns& known) {
+  const CameraCalibration& camera = recording.calibration.cameras.front();
+  if (!areBackwards(turnsAlong(recording, &known), recording.imu, camera,
+                    recording.frames.front().time, recording.frames.back().time))
+    return {};
+  return {{DataFinding::Grade::kFatal, "images_backwards",
+           fmt::format("the images of {} turn as the gyroscope says if they are played backwards: "
+                       "they are listed in reverse order; reverse the column of their names",
+                       camera.name)}};
 }
 
 replay::DataFindings shiftFinding(double shift_s, const CameraCalibration& camera) {

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "common/replay/data_check.h"
+#include "tools/data_check/clock_parts.h"
 #include "tools/data_check/motion_check.h"
 
 namespace perdure::tools {
@@ -24,12 +25,22 @@ std::optional<double> rateOfTurns(const std::vector<Turn>& turns,
 /// Returns the finding with code clock_rate; `rate`: the result of rateOfTurns.
 replay::DataFindings rateFinding(double rate, const CameraCalibration& camera);
 
+/// Whether the gyroscope explains the images' rotation if they are played backwards between the
+/// stamps `first` and `last`.
+bool areBackwards(const std::vector<Turn>& turns, const std::vector<ImuSample>& samples,
+                  const CameraCalibration& camera, TimePoint first, TimePoint last);
+
 /// Reads images from all parts of the drive. Returns the time in s to add to the image stamps, or
 /// nothing if no shift of over a second is certain.
 std::optional<double> shiftOfClocks(const replay::Recording& recording);
 
-/// Reads images from all parts of the drive. Codes: clock_shift, clock_rate.
-replay::DataFindings checkClockLine(const replay::Recording& recording);
+/// Reads images from all parts of the drive. Codes: clock_shift, clock_rate, clock_step.
+/// `parts`, `known`: offsets and rotations that are known already.
+replay::DataFindings checkClockLine(const replay::Recording& recording,
+                                    std::vector<PartOffset> parts, KnownTurns& known);
+
+/// Reads images from all parts of the drive. Code: images_backwards.
+replay::DataFindings checkBackwards(const replay::Recording& recording, KnownTurns& known);
 
 /// Returns the finding with code clock_shift.
 replay::DataFindings shiftFinding(double shift_s, const CameraCalibration& camera);

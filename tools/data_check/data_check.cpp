@@ -8,8 +8,10 @@
 
 #include "tools/data_check/axes_check.h"
 #include "tools/data_check/axis_changes.h"
+#include "tools/data_check/clock_parts.h"
 #include "tools/data_check/clock_shift.h"
 #include "tools/data_check/frozen_images.h"
+#include "tools/data_check/image_flips.h"
 #include "tools/data_check/motion_check.h"
 #include "tools/data_check/pair_check.h"
 #include "tools/data_check/poses/pose_check.h"
@@ -53,33 +55,55 @@ bool surelyAgree(const std::vector<Turn>& turns, const std::vector<ImuSample>& s
          judgeTurns(turns, samples, camera).empty() && judgeAxes(turns, samples, camera).empty();
 }
 
+constexpr std::size_t kMany = 120;  // an axis with little rotation needs more pairs
+
+/// Checks the axes before it reports `found`, because mirrored axes also resemble a rotated or
+/// inverted T_BS.
+replay::DataFindings checkAxes(const replay::Recording& recording,
+                               const std::vector<ImuSample>& lively, const std::vector<Turn>& turns,
+                               const replay::DataFindings& found, KnownTurns& known) {
+  const CameraCalibration& camera = recording.calibration.cameras.front();
+  auto axes = judgeAxes(turns, recording.imu, camera);
+  const bool turned = !found.empty() && found.front().code.starts_with("T_BS_");
+  if (!axes.empty() || turned) {
+    auto flips = judgeFlips(turnsOfImages(recording, lively, kMany, &known), recording.imu, camera);
+    if (!flips.empty()) return flips;
+  }
+  if (!axes.empty()) {
+    const bool offset = !found.empty() && found.front().code == "time_offset";
+    if (!offset || !offsetExplainsAxes(turns, recording.imu, camera)) return axes;
+    axes.front().text += "; or see the stamps, which explain it as well:";
+    axes.front().grade = Grade::kWarning;
+    axes.push_back(found.front());
+    return axes;
+  }
+  if (!found.empty() || axesSurelyAgree(turns, recording.imu, camera)) return found;
+  return judgeAxisChanges(turnsOfImages(recording, lively, kMany, &known), recording.imu, camera);
+}
+
 replay::DataFindings checkTurns(const replay::Recording& recording) {
   const CameraCalibration& camera = recording.calibration.cameras.front();
   const auto lively = livelinessOfAxes(recording.imu);
   KnownTurns known;
-  const auto few = turnsOfImages(recording, lively, 36, &known);
-  if (surelyAgree(few, recording.imu, camera)) return {};
+  const auto first = turnsOfImages(recording, lively, 36, &known);
+  auto parts = offsetsOfParts(first, recording.imu, camera);
+  const bool stepped = hasStampStep(recording);
+  if (!stepped && !offsetsDiffer(parts, camera) && surelyAgree(first, recording.imu, camera))
+    return {};
   const auto turns = turnsOfImages(recording, recording.imu, 60, &known);
-  if (disagree(turns, recording.imu, camera)) {
-    if (auto clocks = checkClockLine(recording); !clocks.empty()) return clocks;
+  if (auto constant = judgeConstantAxis(turns, recording.imu, camera); !constant.empty())
+    return constant;
+  for (const auto& part : offsetsOfParts(turns, recording.imu, camera)) parts.push_back(part);
+  const bool other = disagree(turns, recording.imu, camera);
+  if (stepped || other || offsetsDiffer(parts, camera)) {
+    if (auto clocks = checkClockLine(recording, parts, known); !clocks.empty()) return clocks;
   }
   const auto findings = judgeTurns(turns, recording.imu, camera);
   const bool unit = !findings.empty() && (findings.front().code.starts_with("gyro_") ||
                                           findings.front().code == "images_still");
   if (unit && findings.front().code != "gyro_factor") return findings;
-  // Axes are checked first, because mirrored axes also resemble a rotated or inverted T_BS.
-  auto axes = judgeAxes(turns, recording.imu, camera);
-  if (!axes.empty()) {
-    const bool offset = !findings.empty() && findings.front().code == "time_offset";
-    if (!offset || !offsetExplainsAxes(turns, recording.imu, camera)) return axes;
-    axes.front().text += "; or see the stamps, which explain it as well:";
-    axes.front().grade = Grade::kWarning;
-    axes.push_back(findings.front());
-    return axes;
-  }
-  if (!findings.empty() || axesSurelyAgree(turns, recording.imu, camera)) return findings;
-  constexpr std::size_t kTurns = 120;  // an axis with little rotation needs more pairs
-  return judgeAxisChanges(turnsOfImages(recording, lively, kTurns, &known), recording.imu, camera);
+  const auto axes = checkAxes(recording, lively, turns, findings, known);
+  return axes.empty() && other ? checkBackwards(recording, known) : axes;
 }
 
 }  // namespace
@@ -100,7 +124,9 @@ replay::DataFindings checkDrive(const replay::Recording& recording, const replay
   add("repeated images", findings, [&] { return checkFrozenImages(recording); });
   add("what belongs together", findings, [&] { return checkPairs(recording); });
   add("the two cameras", findings, [&] { return checkStereo(recording); });
-  if (use.imu) add("turning", findings, [&] { return checkTurns(recording); });
+  const bool irregular = std::ranges::any_of(
+      findings, [](const auto& one) { return one.code == "stamps_of_arrival"; });
+  if (use.imu && !irregular) add("turning", findings, [&] { return checkTurns(recording); });
   return findings;
 }
 

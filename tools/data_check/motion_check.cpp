@@ -164,6 +164,26 @@ bool isInDegrees(const TurnPairs& pairs, double pair_s, const CameraCalibration&
          ratio < 2.0 * kDegrees;
 }
 
+/// Returns a finding if the rates, without their mean, are thousands of times those of the images
+/// or of any body. Their integrals exceed a turn, so that they cannot be compared.
+replay::DataFindings judgeThousandths(const TurnPairs& pairs, double pair_s,
+                                      const std::vector<ImuSample>& samples,
+                                      const CameraCalibration& camera) {
+  constexpr double kLeast = 5e3, kLeast_px = 0.3, kNoBody = 100.0;  // rad/s
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double squares = 0.0;
+  for (const auto& sample : samples) sum += sample.gyro, squares += sample.gyro.squaredNorm();
+  const auto count = static_cast<double>(samples.size());
+  const double rate = std::sqrt(std::max(0.0, squares - sum.squaredNorm() / count) / count);
+  const bool seen = pairs.turning() * camera.fx > kLeast_px;
+  if (rate < kNoBody && !(seen && rate * pair_s > kLeast * pairs.turning())) return {};
+  return {{DataFinding::Grade::kFatal, "gyro_scale",
+           fmt::format("the gyroscope's rates vary by {:.3g} (RMS), far more than the images show: "
+                       "they are in thousandths of a degree per second (then multiply its columns "
+                       "by 1.74533e-5), or the sensor's counts (by the scale of its data sheet)",
+                       rate)}};
+}
+
 /// Judges the unit: rates that are far larger or smaller than the image rotation.
 replay::DataFindings judgeScale(const TurnPairs& pairs, double pair_s,
                                 const CameraCalibration& camera) {
@@ -322,7 +342,8 @@ replay::DataFindings judgeTurns(const std::vector<Turn>& turns,
   const TurnPairs pairs = pairsOf(turns, gyro, camera.time_offset_s);
   if (pairs.count() < kLeastTurns) return {};
   const double pair_s = toSeconds(turns.front().to - turns.front().from);
-  auto findings = judgeScale(pairs, pair_s, camera);
+  auto findings = judgeThousandths(pairs, pair_s, samples, camera);
+  if (findings.empty()) findings = judgeScale(pairs, pair_s, camera);
   if (!findings.empty()) return findings;
   if (std::min(pairs.turningOfGiven(), pairs.turning()) * camera.fx < kEnough_px) return {};
   auto place = judgePlace(turns, gyro, pairs, camera);

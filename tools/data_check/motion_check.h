@@ -38,8 +38,9 @@ std::vector<Turn> turnsAlong(const replay::Recording& recording, KnownTurns* kno
 bool disagree(const std::vector<Turn>& turns, const std::vector<ImuSample>& samples,
               const CameraCalibration& camera);
 
-/// Codes: gyro_in_degrees, images_still, gyro_too_small, gyro_constant, gyro_factor, T_BS_inverted,
-/// T_BS_turned, time_offset. Returns nothing if images or gyroscope rotate too little.
+/// Codes: gyro_in_degrees, gyro_scale, images_still, gyro_too_small, gyro_constant, gyro_factor,
+/// T_BS_inverted, T_BS_turned, time_offset. Returns nothing if images or gyroscope rotate too
+/// little.
 replay::DataFindings judgeTurns(const std::vector<Turn>& turns,
                                 const std::vector<ImuSample>& samples,
                                 const CameraCalibration& camera);

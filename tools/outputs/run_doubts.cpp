@@ -37,6 +37,40 @@ constexpr Rule kRules[] = {
 
 std::string sentenceOf(const Doubt& doubt) { return doubt.what + ": " + doubt.fix; }
 
+Doubts doubtsOfFindings(const replay::DataFindings& findings) {
+  Doubts doubts;
+  constexpr std::pair<const char*, const char*> kFindings[] = {
+      {"clock_wrapped", "stamps were changed"},
+      {"clock_set", "stamps were changed"},
+      {"clock_step", "one clock was set during the drive"},
+      {"clock_rate", "the clocks of camera and IMU run at different rates"},
+      {"stamps_of_arrival", "the images have stamps of arrival"},
+      {"motion_", "the motion contradicts the rig"},
+      {"gyro_factor", "the scale of the gyroscope, or the focal length, does not fit"},
+      {"imu_bursts", "the inertial samples have stamps of packets"},
+      {"imu_saturated", "the IMU is saturated"},
+      {"images_flipped", "the images are mirrored or upside down"},
+      {"clock_", "stamps pause or jump"},
+      {"declared_rates", "sensor rates differ from the declared ones"},
+      {"imu_covers_part", "images lie outside of the inertial samples"},
+      {"images_frozen", "the images do not change"},
+      {"images_denied", "images may not be read"},
+      {"images_repeated", "images are repeated"},
+      {"lines_lost", "lines of the recording were not used"},
+      {"boxes_beyond", "boxes of other frames were not used"},
+      {"boxes_of_part", "boxes may have wrong frame numbers"},
+      {"boxes_outside", "boxes do not fit the size of the images"},
+      {"classes_unknown", "classes of boxes are not known"},
+      {"imu_repeats", "the IMU repeats one sample"},
+      {"poses_", "the poses contradict the drive"}};
+  for (const auto& finding : findings) {
+    const auto kind = std::ranges::find_if(
+        kFindings, [&](const auto& one) { return finding.code.starts_with(one.first); });
+    if (kind != std::end(kFindings)) doubts.push_back({kind->second, finding.text});
+  }
+  return doubts;
+}
+
 }  // namespace
 
 std::uint64_t imagesLost(const ReasonCounts& capture) {
@@ -48,12 +82,13 @@ std::uint64_t imagesLost(const ReasonCounts& capture) {
 }
 
 Doubts doubtsOfRun(const RunFacts& facts) {
-  Doubts doubts;
+  Doubts doubts = doubtsOfFindings(facts.findings);
+  const char* first = doubts.empty() ? "" : "see the cause above; otherwise ";
   for (const Rule& rule : kRules) {
     const std::uint64_t times = facts.vio.of(rule.code);
     if (rule.one_of * times <= facts.frames) continue;
-    doubts.push_back(
-        {fmt::format("{} at {} of {} frames", rule.what, times, facts.frames), rule.fix});
+    doubts.push_back({fmt::format("{} at {} of {} frames", rule.what, times, facts.frames),
+                      std::string(first) + rule.fix});
   }
   if (const std::uint64_t times = facts.vio.of("reset"); times > 0) {
     doubts.push_back(
@@ -82,28 +117,6 @@ Doubts doubtsOfRun(const RunFacts& facts) {
     doubts.push_back({fmt::format("the map is empty although there are {} boxes", facts.boxes),
                       "check that they belong to these frames, that their classes are known, and "
                       "that the camera moves past the objects"});
-  }
-  constexpr std::pair<const char*, const char*> kFindings[] = {
-      {"clock_wrapped", "stamps were changed"},
-      {"clock_set", "stamps were changed"},
-      {"clock_rate", "the clocks of camera and IMU run at different rates"},
-      {"clock_", "stamps pause or jump"},
-      {"declared_rates", "sensor rates differ from the declared ones"},
-      {"imu_covers_part", "images lie outside of the inertial samples"},
-      {"images_frozen", "the images do not change"},
-      {"images_denied", "images may not be read"},
-      {"images_repeated", "images are repeated"},
-      {"lines_lost", "lines of the recording were not used"},
-      {"boxes_beyond", "boxes of other frames were not used"},
-      {"boxes_of_part", "boxes may have wrong frame numbers"},
-      {"boxes_outside", "boxes do not fit the size of the images"},
-      {"classes_unknown", "classes of boxes are not known"},
-      {"imu_repeats", "the IMU repeats one sample"},
-      {"poses_", "the poses contradict the drive"}};
-  for (const auto& finding : facts.findings) {
-    const auto kind = std::ranges::find_if(
-        kFindings, [&](const auto& one) { return finding.code.starts_with(one.first); });
-    if (kind != std::end(kFindings)) doubts.push_back({kind->second, finding.text});
   }
   return doubts;
 }

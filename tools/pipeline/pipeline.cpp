@@ -83,6 +83,7 @@ void Pipeline::run(const std::function<void(const PipelineCounts&)>& progress) {
   if (vio_) {
     timer_.timeTowardsNext("vio", [&] { vio_->flush(); });
     rig_watch_->remember(*vio_);
+    judgeMotion();
   }
   if (known_poses_) {
     timer_.timeTowardsNext("vio", [&] { known_poses_->flush(); });

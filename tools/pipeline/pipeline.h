@@ -63,7 +63,7 @@ class Pipeline {
   const OutputWriter& outputs() const { return *outputs_; }
   OutputWriter& outputs() { return *outputs_; }
   std::uint64_t configurationDigest() const { return configs_.digest; }
-  /// Findings in the data before the run.
+  /// Findings in the data before the run, and about the rig after a doubtful one.
   const replay::DataFindings& findings() const { return findings_; }
   /// Index of the first frame of the data in use.
   std::uint64_t firstFrame() const { return first_index_; }
@@ -103,6 +103,7 @@ class Pipeline {
   void checkData();
   void checkDetectionFile();
   void checkClasses(const semantic_filter::ClassPriors& priors);
+  void judgeMotion();
   void refuseUnwritten() const;
   // These functions are in pipeline_recorded.cpp.
   void checkRecorded();

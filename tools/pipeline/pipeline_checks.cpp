@@ -11,6 +11,7 @@
 #include "common/base/errors.h"
 #include "common/replay/files/text_file.h"
 #include "services/vio/cameras.h"
+#include "tools/calibrate/motion/from_motion.h"
 #include "tools/data_check/data_check.h"
 #include "tools/data_check/poses/pose_check.h"
 #include "tools/evaluate/simulated_truth.h"
@@ -232,6 +233,15 @@ void Pipeline::refuseUnwritten() const {
                      code.ends_with("disk_full") ? "no space left on device" : code);
     }
   }
+}
+
+/// If vio's results are doubtful without a known cause, adds what the motion shows about the lens
+/// and the stamps.
+void Pipeline::judgeMotion() {
+  const replay::Recording& recording = dataset_->recording();
+  if (!findings_.empty() || recording.imu.empty() || doubts().empty()) return;
+  findings_ = calibrate::checkMotion(recording).findings;
+  for (auto& finding : findings_) finding.code.insert(0, "motion_");
 }
 
 Doubts Pipeline::doubts() const {

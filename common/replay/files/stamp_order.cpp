@@ -1,20 +1,18 @@
 #include "common/replay/files/stamp_order.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <array>
 #include <numeric>
 #include <optional>
 
 #include "common/base/algorithms/median.h"
+#include "common/replay/files/counters.h"
 #include "common/replay/files/stamps.h"
 #include "common/replay/files/text_file.h"
 
 namespace perdure::replay {
 namespace {
 
-using std::chrono::hours, std::chrono::seconds;
+using std::chrono::hours;
 using Times = std::vector<TimePoint>;
 using Kind = ClockChange::Kind;
 
@@ -22,42 +20,6 @@ constexpr std::size_t kFew = 3;        ///< number of strays accepted for any nu
 constexpr std::size_t kFewShare = 50;  ///< at most one stray stamp per this number of stamps
 constexpr int kFarIntervals =
     32;  ///< a stray is farther outside its neighbours' stamps than this number of intervals
-
-struct Counter {
-  Duration length;
-  std::string name;
-};
-
-/// Periods after which sensor clocks start again at 0.
-std::vector<Counter> counters() {
-  struct Tick {
-    std::int64_t ns;
-    const char* name;
-  };
-  constexpr std::array kTicks{Tick{1, "ns"},           Tick{100, "100 ns"},
-                              Tick{1000, "µs"},        Tick{10'000, "10 µs"},
-                              Tick{100'000, "100 µs"}, Tick{1'000'000, "ms"}};
-  std::vector<Counter> all;
-  for (const int bits : {16, 20, 24, 30, 31, 32}) {
-    for (const Tick& tick : kTicks) {
-      all.push_back({Duration((std::int64_t{1} << bits) * tick.ns),
-                     fmt::format("{} bits of {}", bits, tick.name)});
-    }
-  }
-  const auto ofRate = [](int bits, std::int64_t hz) {  // 2^bits · 10⁹ exceeds 64 bits
-    const std::int64_t ticks = std::int64_t{1} << bits, rest = ticks % hz;
-    return seconds(ticks / hz) + Duration(rest * 1'000'000'000 / hz);
-  };
-  all.insert(all.end(), {{ofRate(32, 90'000), "32 bits of 1/90 ms"},
-                         {ofRate(33, 90'000), "33 bits of 1/90 ms"},
-                         {ofRate(24, 32'768), "24 bits of 1/32768 s"},
-                         {Duration(std::int64_t{1} << 48), "48 bits of ns"},
-                         {std::chrono::minutes(1), "a minute"},
-                         {hours(1), "an hour"},
-                         {hours(24), "a day"},
-                         {hours(7 * 24), "a week"}});
-  return all;
-}
 
 /// Reads the digits HHMMSS of a time of day, whose last digit counts `second`, with its fraction;
 /// nothing if they are none.
@@ -287,7 +249,7 @@ class ClockWalk {
       const Duration minute = second * 60, day = minute * 60 * 24;
       if (!before || !after || *after % minute > *before % minute) continue;
       const Duration step = (*after - *before + day) % day;
-      if (step > Duration{0} && step <= std::max(second / 4, multipleOf(3, usual_))) return true;
+      if (step > Duration{0} && step <= std::max(second / 50, multipleOf(2, usual_))) return true;
     }
     return false;
   }
@@ -334,22 +296,27 @@ class ClockWalk {
     return after > before && between(after, before) <= multipleOf(kLost, usual_);
   }
 
-  /// Finds the counter that has the length of the step back. Between regular stamps it must agree
-  /// to about a sample; if all stamps lie within one period of the counter, to 1 % and 20 samples.
+  /// Finds the counter whose length explains the step back best. Between regular stamps it must
+  /// agree to about a sample; if all stamps lie within one period of the counter, to 1 % and 20
+  /// samples.
   bool findCounter(ClockChange& change, bool regular) const {
-    static const std::vector<Counter> kCounters = counters();
-    for (const Counter& counter : kCounters) {
+    Duration least = Duration::max();
+    for (const Counter& counter : knownCounters()) {
       const Duration gap = counter.length - between(change.before, change.after);
       const bool whole = least_ >= TimePoint{} && most_ < TimePoint{} + counter.length;
       const Duration lost = std::min(counter.length / 100, multipleOf(kLost, usual_));
-      const Duration most = std::max(multipleOf(3, usual_), whole ? lost : usual_);
+      const Duration most = counter.of_cycles
+                                ? multipleOf(2, usual_)
+                                : std::max(multipleOf(3, usual_), whole ? lost : usual_);
       if (!(whole || regular) || gap <= Duration{0} || gap > most ||
           multipleOf(whole ? 2 : 10, most) > counter.length)
         continue;
-      change.kind = Kind::kCounter, change.added = counter.length, change.counter = counter.name;
-      return true;
+      if (const Duration off = std::chrono::abs(gap - usual_); off < least) {
+        least = off;
+        change.kind = Kind::kCounter, change.added = counter.length, change.counter = counter.name;
+      }
     }
-    return false;
+    return least != Duration::max();
   }
 
   /// Returns whether the stamps from i on are lines out of order: they fill a gap between earlier

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "common/replay/recording.h"
 
 namespace perdure::replay {
@@ -163,6 +165,31 @@ TEST(ClockCheck, ACounterThatOneSensorDoesNotHaveIsContinuedInBoth) {
   const auto behind = [&](Duration time) { return time - seconds(90); };  // after the wrap only
   const auto drive = readWith(round, behind);
   EXPECT_EQ(drive.frames.front().time - drive.imu.front().time, seconds(20));
+}
+
+TEST(ClockCheck, StampsOfArrivalAreSaidAndAChangedFrameRateIsNone) {
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> latency(0.0, 0.045);
+  const auto late = [&](Duration time) { return time + durationFromSeconds(latency(random)); };
+  EXPECT_THAT(finding(readWith(kSame, late), DataFinding::Grade::kWarning, "stamps_of_arrival"),
+              HasSubstr("a latency that varies by 15 ms"));
+  const auto slower = [](Duration time) {
+    return time + (time > seconds(105) ? (time - seconds(105)) / 2 : Duration{0});
+  };
+  const auto lossy = [](Duration time) { return time + time / seconds(2) * milliseconds(100); };
+  for (const Stamp& images : {Stamp(kSame), Stamp(slower), Stamp(lossy)}) {
+    EXPECT_EQ(finding(readWith(kSame, images), DataFinding::Grade::kWarning, "stamps_of_arrival"),
+              "none");
+  }
+}
+
+TEST(ClockCheck, SamplesOfAFifoAreSaidWithTheirInterval) {
+  const auto packets = [](Duration time) {
+    return time / milliseconds(100) * milliseconds(100) + time % milliseconds(100) / 500;
+  };
+  EXPECT_THAT(
+      finding(readWith(packets, kSame), DataFinding::Grade::kWarning, "imu_bursts"),
+      HasSubstr("packets of 10 samples (a FIFO); stamp them at constant intervals of 10 ms"));
 }
 
 TEST(ClockCheck, DifferencesOfClocksHaveTheirCauses) {

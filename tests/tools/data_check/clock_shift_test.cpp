@@ -105,6 +105,67 @@ TEST(ClockRate, IsFoundAndAConstantShiftIsNone) {
   }
 }
 
+/// A recording of these samples, with images each 50 ms.
+replay::Recording recordingOf(std::vector<ImuSample> samples) {
+  replay::Recording recording;
+  recording.imu = std::move(samples);
+  recording.calibration.cameras = {camera()};
+  recording.frames.resize(1800);
+  for (int i = 0; i < 1800; ++i) {
+    recording.frames[static_cast<std::size_t>(i)].time = kStart + i * milliseconds(50);
+  }
+  return recording;
+}
+
+TEST(ClockParts, AStepOfLessThanASecondIsFoundWithItsPlace) {
+  const auto turns = turnsOf(randomTurning(1), Duration{0});
+  const auto judged = [&](Duration imu_step, Duration image_step) {
+    auto recording = recordingOf(randomTurning(1));
+    const TimePoint at = kStart + seconds(41);
+    for (auto& sample : recording.imu) sample.time += sample.time < at ? Duration{0} : imu_step;
+    for (auto& frame : recording.frames) frame.time += frame.time < at ? Duration{0} : image_step;
+    auto seen = turns;
+    for (auto& turn : seen) {
+      for (TimePoint* time : {&turn.from, &turn.to}) *time += *time < at ? Duration{0} : image_step;
+    }
+    return judgeParts(offsetsOfParts(seen, recording.imu, camera()), recording);
+  };
+  const auto of_imu = judged(milliseconds(150), Duration{0});
+  ASSERT_EQ(of_imu.size(), 1U);
+  EXPECT_THAT(of_imu[0].text,
+              HasSubstr("at 1700000041150000000 ns the stamps of the IMU jump ahead by 0.150 s"));
+  const auto of_images = judged(Duration{0}, milliseconds(120));
+  ASSERT_EQ(of_images.size(), 1U);
+  EXPECT_THAT(of_images[0].text, HasSubstr("the stamps of cam0 jump ahead by 0.120 s"));
+  EXPECT_TRUE(judged(Duration{0}, Duration{0}).empty());
+  EXPECT_TRUE(judged(milliseconds(150), milliseconds(150)).empty());
+}
+
+TEST(ClockParts, AClockThatIsSlightlyFastIsFoundWithItsFactor) {
+  const auto recording = recordingOf(randomTurning(2));
+  auto turns = turnsOf(recording.imu, Duration{0});
+  for (Turn& turn : turns) {
+    for (TimePoint* time : {&turn.from, &turn.to}) *time += (*time - kStart) / 300;
+  }
+  const auto found = judgeParts(offsetsOfParts(turns, recording.imu, camera()), recording);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_THAT(found[0].text, HasSubstr("0.33 % too fast"));
+  EXPECT_THAT(found[0].text, HasSubstr("since the first by about 0.996"));
+}
+
+TEST(ClockShift, ImagesInReverseOrderAreRecognised) {
+  const auto samples = randomTurning(1);
+  const TimePoint last = kStart + seconds(88);
+  const auto turns = turnsOf(samples, Duration{0});
+  std::vector<Turn> reversed;
+  for (auto turn = turns.rbegin(); turn != turns.rend(); ++turn) {
+    reversed.push_back(
+        {last - (turn->to - kStart), last - (turn->from - kStart), -turn->of_images});
+  }
+  EXPECT_TRUE(areBackwards(reversed, samples, camera(), kStart, last));
+  EXPECT_FALSE(areBackwards(turns, samples, camera(), kStart, last));
+}
+
 TEST(ClockShift, IsNamedWithItsCauseAndItsFix) {
   const auto textOf = [](double shift) { return shiftFinding(shift, camera()).front().text; };
   EXPECT_THAT(textOf(-37.0), HasSubstr("37 s ahead of that of the IMU by their turning, as TAI"));

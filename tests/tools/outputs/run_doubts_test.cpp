@@ -68,9 +68,10 @@ TEST(Doubts, TheLastLineNamesWhatWouldElseBeSilent) {
   RunFacts facts{.vio = vio, .frames = 240, .boxes = 70};
   facts.findings.push_back({{}, "clock_set", "set back by 2 s"});
   facts.findings.push_back({{}, "time_offset", "not of this kind"});
-  EXPECT_EQ(endOfLine(doubtsOfRun(facts)),
-            " | WARNING: no image point could be used at 90 of 240 frames; the map is empty "
-            "although there are 70 boxes; stamps were changed");
+  EXPECT_EQ(
+      endOfLine(doubtsOfRun(facts)),
+      " | WARNING: stamps were changed; no image point could be used at 90 of 240 frames; the "
+      "map is empty although there are 70 boxes");
   EXPECT_THAT(sentences(facts), Contains(HasSubstr("set back by 2 s")));
   for (const char* code : {"clock_paused", "poses_other_axes", "boxes_beyond", "lines_lost"}) {
     EXPECT_THAT(sentences({.frames = 9, .findings = {{{}, code, "the amount"}}}),
@@ -85,6 +86,17 @@ TEST(Doubts, PosesOfAPartOfTheDriveAreTold) {
               ElementsAre(HasSubstr("30 of 240 frames have no pose")));
   EXPECT_THAT(sentences({.frames = 240, .without_pose = 234}),
               ElementsAre(HasSubstr("234 of 240 frames have no pose")));
+}
+
+TEST(RunDoubts, ACauseInTheDataComesBeforeItsConsequences) {
+  RunFacts facts{.frames = 100};
+  facts.vio.add("images_contradict_imu", 60);
+  EXPECT_THAT(doubtsOfRun(facts)[0].fix, testing::StartsWith("T_BS"));
+  facts.findings = {{replay::DataFinding::Grade::kWarning, "clock_step", "stamps jump"}};
+  const auto doubts = doubtsOfRun(facts);
+  ASSERT_EQ(doubts.size(), 2U);
+  EXPECT_EQ(doubts[0].fix, "stamps jump");
+  EXPECT_THAT(doubts[1].fix, testing::StartsWith("see the cause above; otherwise T_BS"));
 }
 
 }  // namespace

@@ -48,22 +48,25 @@ void checkPosesOf(const Drive& drive, const replay::Recording& recording, Findin
   }
 }
 
-/// Adds the findings about the rig from the motion, which are the most exact ones. Returns whether
-/// they contradict the rig; then vio need not be run, because it would only show the consequences.
-bool checkMotionOf(const replay::Recording& recording, replay::DataFindings& of_data,
+/// Whether vio would only show the consequences of a finding.
+bool isCause(const replay::DataFinding& finding) {
+  constexpr const char* kCauses[] = {"focal_length", "time_offset",    "readout",
+                                     "clock_step",   "clock_rate",     "imu_bursts",
+                                     "imu_repeats",  "images_flipped", "stamps_of_arrival"};
+  return std::ranges::any_of(kCauses, [&](const char* code) { return finding.code == code; });
+}
+
+/// Adds the findings about the rig from the motion, which are the most exact ones.
+void checkMotionOf(const replay::Recording& recording, replay::DataFindings& of_data,
                    Findings& findings) {
   const auto is_coarse = [](const replay::DataFinding& finding) {
     return finding.code == "time_offset" || finding.code == "gyro_factor";
   };
-  if (!std::ranges::all_of(of_data, is_coarse)) return false;
-  if (recording.imu.empty() || recording.calibration.cameras.empty()) return false;
+  if (!std::ranges::all_of(of_data, is_coarse)) return;
+  if (recording.imu.empty() || recording.calibration.cameras.empty()) return;
   const auto check = calibrate::checkMotion(recording);
   if (!check.findings.empty()) of_data = check.findings;
   findings.push_back({Verdict::kOk, check.basis});
-  return std::ranges::any_of(check.findings, [](const replay::DataFinding& finding) {
-    return finding.code == "focal_length" || finding.code == "time_offset" ||
-           finding.code == "readout";
-  });
 }
 
 /// Checks the recording. Returns whether it is usable for checking the rig with vio.
@@ -79,13 +82,13 @@ bool checkRecording(const Drive& drive, const replay::Recording& recording, Find
     findings.push_back({Verdict::kOk, "stamps, units, images and axes agree"});
   }
   const bool usable = isUsable(of_data), without_imu = of_layout && !recording.calibration.imu;
-  const bool contradicted = checkMotionOf(recording, of_data, findings);
+  checkMotionOf(recording, of_data, findings);
   addFindings(of_data, findings);
   if (usable) checkPosesOf(drive, recording, findings);
-  if (contradicted) {
+  if (usable && std::ranges::any_of(of_data, isCause)) {
     findings.push_back({Verdict::kFail,
-                        "vio was not run, because the motion contradicts the rig: correct what is "
-                        "named above, and check again"});
+                        "vio was not run, because it would only show the consequences: correct "
+                        "what is named above, and check again"});
     return false;
   }
   if (usable && without_imu) {

@@ -206,6 +206,36 @@ TEST(Clocks, LostSamplesAndOtherCountersAreNoDigits) {
   }
 }
 
+TEST(Clocks, OfTwoCountersTheOneIsTakenThatContinuesTheStamps) {
+  for (const auto& [hz, name] : {std::pair(72'000'000ll, "32 bits of cycles at 72 MHz"),
+                                 {168'000'000ll, "32 bits of cycles at 168 MHz"},
+                                 {25'600ll * 256, "24 bits of 39.0625 µs (a sensor's time)"}}) {
+    auto stamps = every(kInterval, 400);
+    const Duration length(static_cast<std::int64_t>(4294967296.0 / static_cast<double>(hz) * 1e9));
+    for (std::size_t i = 0; i < stamps.size(); ++i) {
+      stamps[i] = TimePoint((static_cast<std::int64_t>(i) - 200) * milliseconds(10) +
+                            (i < 200 ? length : Duration{0}));
+    }
+    const auto order = orderOf(stamps);
+    ASSERT_EQ(order.changes.size(), 1U) << name;
+    EXPECT_EQ(order.changes[0].counter, name);
+  }
+}
+
+TEST(Clocks, APauseThatEndsShortlyAfterAFullMinuteIsNoTimeOfDay) {
+  for (const auto& [pause, kind] :
+       {std::pair(milliseconds(40'200), Kind::kPause), {milliseconds(40'000), Kind::kDigits}}) {
+    auto stamps = every(kInterval, 600);
+    for (std::size_t i = 0; i < 600; ++i) {
+      stamps[i] = TimePoint(seconds(1757) + static_cast<std::int64_t>(i) * milliseconds(10) +
+                            (i < 300 ? Duration{0} : pause));
+    }
+    const auto order = orderOf(stamps);
+    ASSERT_EQ(order.changes.size(), 1U);
+    EXPECT_EQ(order.changes[0].kind, kind) << pause.count();
+  }
+}
+
 TEST(Clocks, ACounterMayComeRoundOftenAndFromAnyStart) {
   const Duration length(std::int64_t{1000} << 16);  // 65.5 ms
   expectRegular(orderWritten(100, [&](Duration time) { return time % length; }), 100);
