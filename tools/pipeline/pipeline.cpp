@@ -245,7 +245,7 @@ void Pipeline::finish() {
     outputs_->setInMap(in_map_->finish(map_->mapper(), outputs_->history().lastBeliefs()));
   }
   outputs_->finish();
-  if (const auto& cameras = dataset_->calibration().cameras; !cameras.empty())
+  if (const auto& cameras = dataset_->calibration().cameras; detection_file_ && !cameras.empty())
     box_doubt_ = doubtOfBoxes(outputs_->log().frames(), cameras.front());
   if (graph_waits_) {
     askForGraph();
