@@ -106,6 +106,7 @@ const FLIP_S = 1; // shorter changes of visibility are not listed
 export class EventLog {
   constructor(list, filter, model, onLink, onPlace) {
     Object.assign(this, { list, filter, model });
+    list.addEventListener('keydown', (e) => { if (e.key === 'Enter') (e.target.querySelector('[data-object]') ?? e.target).click(); });
     list.addEventListener('click', (e) => {
       const link = e.target.closest('[data-object]'), place = e.target.closest('[data-at]');
       if (link) onLink(Number(link.dataset.object));
@@ -123,6 +124,8 @@ export class EventLog {
     this.list.innerHTML = '<li class="empty">No events yet.</li>';
     this.newest = new Map(); // "group object" → {line, time, event} of the newest event
   }
+
+  hides(group) { return this.list.classList.contains(`without-${group}`); }
 
   applyFilter() {
     for (const button of this.filter.children) this.list.classList.toggle(`without-${button.dataset.group}`, button.getAttribute('aria-pressed') !== 'true');
@@ -147,6 +150,7 @@ export class EventLog {
     line.dataset.kind = event.event;
     line.dataset.group = group;
     if (event.at) line.dataset.at = event.at.join();
+    if (event.at || event.object_id) line.tabIndex = 0;
     let words = escaped(event.words) + (event.detail ? ` <span class="dim">${escaped(event.detail)}</span>` : '');
     for (const id of new Set([event.object_id, event.other_id])) {
       // Does not link an id's digits inside a number, such as 0.1 s.

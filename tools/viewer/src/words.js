@@ -95,6 +95,8 @@ export const LOOPS = {
 };
 export const lookOfLoop = (loop) => (loop.state !== 'confirmed' ? loop.state : loop.kind === 'tie' ? 'tie' : 'confirmed');
 
+export const wordsOf = (o) => `${o.class} ${o.id}`;
+
 /** Escapes a text for HTML. */
 export const escaped = (text) => String(text).replace(/[&<>"']/g, (c) => `&#${c.codePointAt(0)};`);
 
