@@ -47,7 +47,7 @@ export class ObjectList {
     this.order = shown.map((o) => o.id);
     const seen = here.filter((o) => looksLike(o) === 'seen').length, hidden = here.filter((o) => looksLike(o) === 'hidden').length;
     this.note.textContent = this.model.answer?.note ?? (all.length === 0
-      ? (this.search.value ? 'Nothing here matches; the whole map can be asked.' : 'No objects yet.')
+      ? (this.search.value ? 'No match here; "whole map" searches the map.' : 'No objects yet.')
       : `${seen} in sight, ${hidden} hidden, ${here.length - seen - hidden} out of view, ${left.length} on the map only${this.model.elsewhere > 0 ? `; ${this.model.elsewhere} of earlier sessions: where they are from here is not known yet` : ''}`);
     const wanted = new Set(this.order);
     for (const [id, row] of this.rows) {
@@ -187,5 +187,5 @@ export function renderServices(element, health) {
       <p class="figures">${s.rate_hz.toFixed(1)} Hz, in ${s.frames_in}, out ${s.frames_out}, dropped ${s.dropped}; ${cpu}${s.rss_mb.toFixed(0)} MB</p>
       ${reasons ? `<details data-process="${escaped(s.process)}"${open.has(s.process) ? ' open' : ''}><summary>counted</summary><div class="reasons">${reasons}</div></details>` : ''}</article>`;
   });
-  element.innerHTML = articles.join('') || '<p class="empty">No service is heard.</p>';
+  element.innerHTML = articles.join('') || '<p class="empty">No data from services.</p>';
 }

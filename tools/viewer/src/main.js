@@ -176,11 +176,11 @@ function questionOf(text) {
 async function askMap() {
   const word = $('search').value.trim();
   const request = questionOf(word);
-  $('list-note').textContent = 'The map is asked …';
+  $('list-note').textContent = 'Waiting for the map …';
   try {
     const reply = await connection.call('/map/query', request);
     const many = reply.truncated ? ', and there are more' : '';
-    setAnswer(reply.objects, reply.objects.length === 0 ? `The map has nothing ${'near' in request ? 'there' : `that is "${word}"`}.` : `The map has ${reply.objects.length}${many}.`);
+    setAnswer(reply.objects, reply.objects.length === 0 ? `The map has no object ${'near' in request ? 'there' : `"${word}"`}.` : `The map has ${reply.objects.length}${many}.`);
   } catch (error) {
     setAnswer(null, `The map does not answer: ${error.message}`);
   }
@@ -309,7 +309,7 @@ function showState() {
   const [state, sentence] = troubleOf(model, { ...status, playback: connection.playback }, now);
   playback.render();
   timeline.render();
-  const words = { live: 'live', degraded: 'degraded', stale: 'nothing comes', played: connection.playback?.status ?? '', lost: 'no connection', connecting: 'connecting' };
+  const words = { live: 'live', degraded: 'degraded', stale: 'no data', played: connection.playback?.status ?? '', lost: 'no connection', connecting: 'connecting' };
   $('state').dataset.state = model.past === undefined ? state : 'stale';
   $('state').textContent = model.past === undefined ? words[state] : 'paused';
   document.body.dataset.state = state;

@@ -162,7 +162,7 @@ export function troubleOf(model, connection, now) {
   const heard = services.filter((s) => s.age_s < 2.5);
   const capture = heard.find((s) => s.process === 'capture');
   if (heard.length === 0 && silent > 2) {
-    return ['stale', 'No service is heard: do they run, with the same bus.domain, bus.interface and bus.vehicle as the gateway? (perdure status)'];
+    return ['stale', 'No data from any service: do they run, with the same bus.domain, bus.interface and bus.vehicle as the gateway? (perdure status)'];
   }
   // A new client receives the last `objects` once, even if they are old.
   const last = silent > 2 || !model.live;
@@ -171,8 +171,8 @@ export function troubleOf(model, connection, now) {
     const bad = services.filter((s) => s.age_s >= 2.5).map((s) => `${s.process} has been silent for ${Math.round(s.age_s)} s`);
     const said = heard.filter((s) => s.state !== 'ok' && s.message).map((s) => `${s.process}: ${s.message}`);
     const why = [...bad, ...said].slice(0, 3).join('; ');
-    const since = silent === Infinity ? 'No objects have come' : `No objects for ${Math.round(silent)} s`;
-    const playing = heard.length === 0 ? ' Recordings that are played end so.' : '';
+    const since = silent === Infinity ? 'No objects since this page was opened' : `No objects for ${Math.round(silent)} s`;
+    const playing = heard.length === 0 ? ' A played recording ends like this.' : '';
     return ['stale', `${since}${why ? ` (${why})` : ''}.${playing || (why ? '' : ' Is semantic_filter running, and does odometry come?')}`];
   }
   const gone = services.filter((s) => s.age_s >= 2.5);

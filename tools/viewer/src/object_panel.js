@@ -36,7 +36,7 @@ export class ObjectPanel {
     const words = this.part();
     if (words === this.told) return;
     this.told = words;
-    this.element.innerHTML = words || '<p class="empty">The map has it no more.</p>';
+    this.element.innerHTML = words || '<p class="empty">It is not on the map any more.</p>';
   }
 
   show(id) {
@@ -72,7 +72,7 @@ export class ObjectPanel {
   render() {
     const o = this.model.objects.get(this.id) ?? this.full?.object ?? this.model.find(this.id);
     if (!o) {
-      this.element.innerHTML = `<p class="empty">${escaped(this.note || 'It is asked for …')}</p>`;
+      this.element.innerHTML = `<p class="empty">${escaped(this.note || 'Waiting for its data …')}</p>`;
       return;
     }
     // Keeps the content while text is being selected.
@@ -121,7 +121,7 @@ export class ObjectPanel {
       const left = returns.in_s.map((s) => Math.max(0, s - (now - returns.said_s)));
       words.push(`It should be seen again in <b>${left[0].toFixed(1)} s</b> (${left[1].toFixed(1)} to ${left[2].toFixed(1)} s).`);
     } else if (this.full && !isInSight(o)) {
-      words.push('When it will be seen again is not known: it is not on the way.');
+      words.push('The next sighting is not predicted.');
     }
     if (o.last_s !== undefined && this.model.time !== undefined && !isInSight(o)) words.push(`Last seen ${Math.max(0, this.model.time - o.last_s).toFixed(1)} s ago.`);
     return words.map((w) => `<p>${w}</p>`).join('');
@@ -156,7 +156,7 @@ export class ObjectPanel {
     const sum = rows.reduce((s, [, e]) => s + e.nats, 0);
     const signed = (n) => (Math.abs(n) < 0.005 ? '0' : `${n > 0 ? '+' : '−'}${Math.abs(n).toFixed(2)}`);
     const lines = rows.map(([kind, e]) => `<tr><td>${ObjectPanel.swing(e.nats, most)}</td><td class="n">${signed(e.nats)}</td><td>${escaped(existenceWords(kind, e.count))}</td></tr>`);
-    return `<h3>Why it is believed to exist (nats)</h3><table class="ledger">${lines.join('')}
+    return `<h3>Evidence that it exists (nats)</h3><table class="ledger">${lines.join('')}
       <tr><td></td><td class="n"><b>${signed(sum)}</b></td><td><b>log-odds: ${percent(1 / (1 + Math.exp(-sum)))}</b></td></tr></table>`;
   }
 
@@ -171,7 +171,7 @@ export class ObjectPanel {
       title = `Why it is a ${first.class} rather than ${second.class}`;
     } else if (ousted) {
       nats = Object.entries(ousted.nats);
-      title = `Why ${ousted.class} was given up for ${ousted.by}`;
+      title = `Why ${ousted.class} was replaced by ${ousted.by}`;
     } else return '';
     nats = nats.filter(([, n]) => Math.abs(n) >= 0.005);
     if (nats.length === 0) return '';
