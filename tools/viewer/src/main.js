@@ -36,7 +36,7 @@ try {
   $('labels').innerHTML = `<p class="empty">This browser draws no WebGL, hence no map: ${escaped(error.message)}</p>`;
 }
 const past = new Past();
-const camera = new CameraView($('camera'), $('image'), $('image-caption'), choose, (time, image) => past.take('image', time, image));
+const camera = new CameraView($('camera'), $('image'), $('image-caption'), choose, (time, image) => { if (!connection.range) past.take('image', time, image); });
 const list = new ObjectList($('list').tBodies[0], $('list-note'), $('search'), model, choose);
 const log = new EventLog($('events'), $('events-filter'), model, choose, (at) => world?.lookAtPlace(at));
 connection.onStatus = (sentence) => log.say(sentence);
