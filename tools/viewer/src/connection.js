@@ -174,19 +174,14 @@ export class Connection {
   }
 }
 
-/** Reads foxglove::CompressedImage in CDR. Returns {time (s), bytes (JPEG)}. */
-export function readImage(view) {
-  let at = 4;
-  const natural = () => {
-    at = (at + 3) & ~3;
-    at += 4;
-    return view.getUint32(at - 4, true);
-  };
-  const time = natural() + 1e-9 * natural();
-  const name = natural(); // length of frame_id
-  at += name;
-  const length = natural();
-  return { time, bytes: new Uint8Array(view.buffer, view.byteOffset + at, length) };
+/** Returns the time (s) of foxglove::CompressedImage in CDR. */
+export const timeOfImage = (view) => view.getUint32(4, true) + 1e-9 * view.getUint32(8, true);
+
+/** Returns the JPEG of foxglove::CompressedImage in CDR, after its time and frame_id. */
+export function bytesOfImage(view) {
+  const lengthAt = (at) => ((at + 3) & ~3) + 4; // after the encapsulation, a string and its padding
+  const at = lengthAt(16 + view.getUint32(12, true));
+  return new Uint8Array(view.buffer, view.byteOffset + at, view.getUint32(at - 4, true));
 }
 
 export const seconds = (stamp) => stamp.sec + 1e-9 * stamp.nsec;

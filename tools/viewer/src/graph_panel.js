@@ -8,7 +8,7 @@ const anchorLink = (id) => `<a data-part="anchor" data-id="${id}">anchor ${id}</
 const object = (id) => `<a data-object="${id}">${id}</a>`;
 
 function sigmaWords(sigma) {
-  if (!sigma.length) return 'not known: how far the way to here may err cannot be told';
+  if (!sigma.length) return 'not known, because that of the trajectory to here is not known';
   if (sigma.every((s) => s === 0)) return 'the map begins here: all other places are relative to it';
   return `± ${metres(sigma[0])}, ${metres(sigma[1])}, ${metres(sigma[2])}; ± ${degrees(sigma[3])}`;
 }
@@ -18,7 +18,7 @@ function anchorWords(a, graph) {
   const sigma = sigmaWords(a.sigma);
   const links = loops.map((l) => `<a data-part="loop" data-id="${l.id}">${l.kind} ${l.id}</a> <span class="dim">${l.state}</span>`);
   return `<h2 style="--c:#8fb8de"><i></i>Anchor ${a.id}</h2>
-    <p>A place on the vehicle's way. ${a.objects} object${a.objects === 1 ? '' : 's'} of the map belong${a.objects === 1 ? 's' : ''} to it, and move${a.objects === 1 ? 's' : ''} with it.</p>
+    <p>A place on the vehicle's trajectory. ${a.objects} object${a.objects === 1 ? '' : 's'} of the map belong${a.objects === 1 ? 's' : ''} to it, and move${a.objects === 1 ? 's' : ''} with it.</p>
     ${table([['x, y, z in map', a.at.map(metres).join(', ')], ['heading', degrees(a.yaw)], ['σ', sigma],
       ['before it', a.previous ? anchorLink(a.previous) : 'nothing: its session begins here'], ['session', escaped(a.session)]])}
     <h3>Loops and ties here</h3>${links.length ? `<p>${links.join('<br>')}</p>` : '<p class="dim">none</p>'}`;
@@ -27,7 +27,7 @@ function anchorWords(a, graph) {
 function loopWords(l) {
   const seen = l.pairs.map(([known, seen]) => (known === seen ? object(known) : `${object(known)} <span class="dim">(seen as ${seen})</span>`));
   const by = seen.length ? `${seen.length} object${seen.length === 1 ? '' : 's'}: ${seen.join(', ')}`
-    : l.landmarks ? `${l.landmarks} landmarks that look alike` : l.kind === 'tie' ? 'objects that still had their ids' : 'not known any more: it was found before the last start';
+    : l.landmarks ? `${l.landmarks} similar landmarks` : l.kind === 'tie' ? 'objects that still had their ids' : 'not known any more: it was found before the last start';
   const r = l.residual, s = l.sigma, known = s.length > 0;
   const row = (name, k, say) => [name, `${say(r[k])}${known ? ` <span class="dim">± ${say(s[k])}</span>` : ''}`];
   return `<h2 style="--c:${LOOPS[lookOfLoop(l)].colour}"><i></i>${l.kind === 'tie' ? 'Tie' : 'Loop'} ${l.id}</h2>

@@ -47,7 +47,7 @@ export class ObjectList {
     this.order = shown.map((o) => o.id);
     const seen = here.filter((o) => looksLike(o) === 'seen').length, hidden = here.filter((o) => looksLike(o) === 'hidden').length;
     this.note.textContent = this.model.answer?.note ?? (all.length === 0
-      ? (this.search.value ? 'Nothing here matches; the whole map can be asked.' : 'No objects yet.')
+      ? (this.search.value ? 'No match here; "whole map" searches the map.' : 'No objects yet.')
       : `${seen} in sight, ${hidden} hidden, ${here.length - seen - hidden} out of view, ${left.length} on the map only${this.model.elsewhere > 0 ? `; ${this.model.elsewhere} of earlier sessions: where they are from here is not known yet` : ''}`);
     const wanted = new Set(this.order);
     for (const [id, row] of this.rows) {
@@ -106,6 +106,7 @@ const FLIP_S = 1; // shorter changes of visibility are not listed
 export class EventLog {
   constructor(list, filter, model, onLink, onPlace) {
     Object.assign(this, { list, filter, model });
+    list.addEventListener('keydown', (e) => { if (e.key === 'Enter') (e.target.querySelector('[data-object]') ?? e.target).click(); });
     list.addEventListener('click', (e) => {
       const link = e.target.closest('[data-object]'), place = e.target.closest('[data-at]');
       if (link) onLink(Number(link.dataset.object));
@@ -123,6 +124,8 @@ export class EventLog {
     this.list.innerHTML = '<li class="empty">No events yet.</li>';
     this.newest = new Map(); // "group object" → {line, time, event} of the newest event
   }
+
+  hides(group) { return this.list.classList.contains(`without-${group}`); }
 
   applyFilter() {
     for (const button of this.filter.children) this.list.classList.toggle(`without-${button.dataset.group}`, button.getAttribute('aria-pressed') !== 'true');
@@ -147,6 +150,7 @@ export class EventLog {
     line.dataset.kind = event.event;
     line.dataset.group = group;
     if (event.at) line.dataset.at = event.at.join();
+    if (event.at || event.object_id) line.tabIndex = 0;
     let words = escaped(event.words) + (event.detail ? ` <span class="dim">${escaped(event.detail)}</span>` : '');
     for (const id of new Set([event.object_id, event.other_id])) {
       // Does not link an id's digits inside a number, such as 0.1 s.
@@ -183,5 +187,5 @@ export function renderServices(element, health) {
       <p class="figures">${s.rate_hz.toFixed(1)} Hz, in ${s.frames_in}, out ${s.frames_out}, dropped ${s.dropped}; ${cpu}${s.rss_mb.toFixed(0)} MB</p>
       ${reasons ? `<details data-process="${escaped(s.process)}"${open.has(s.process) ? ' open' : ''}><summary>counted</summary><div class="reasons">${reasons}</div></details>` : ''}</article>`;
   });
-  element.innerHTML = articles.join('') || '<p class="empty">No service is heard.</p>';
+  element.innerHTML = articles.join('') || '<p class="empty">No data from services.</p>';
 }

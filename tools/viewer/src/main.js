@@ -3,9 +3,13 @@ import { CameraView } from './camera.js';
 import { Connection } from './connection.js';
 import { EventLog, ObjectList, renderServices } from './lists.js';
 import { wordsOfPart } from './graph_panel.js';
-import { Model, troubleOf } from './model.js';
+import { Model, timeOf, troubleOf } from './model.js';
+import { Link } from './link.js';
 import { ObjectPanel } from './object_panel.js';
+import { Past } from './past.js';
 import { PlaybackBar } from './playback.js';
+import { renderPlots } from './plots.js';
+import { TimeLine } from './timeline.js';
 import { MARKS, escaped, lookOfLoop, wordsOfImage, wordsOfNoImage, wordsOfPlace, wordsOfTime } from './words.js';
 import { World } from './world.js';
 
@@ -31,19 +35,37 @@ try {
 } catch (error) {
   $('labels').innerHTML = `<p class="empty">This browser draws no WebGL, hence no map: ${escaped(error.message)}</p>`;
 }
-const camera = new CameraView($('camera'), $('image'), $('image-caption'));
+const past = new Past();
+const camera = new CameraView($('camera'), $('image'), $('image-caption'), choose, (time, image) => { if (!connection.range) past.take('image', time, image); });
 const list = new ObjectList($('list').tBodies[0], $('list-note'), $('search'), model, choose);
 const log = new EventLog($('events'), $('events-filter'), model, choose, (at) => world?.lookAtPlace(at));
 connection.onStatus = (sentence) => log.say(sentence);
 const panel = new ObjectPanel($('object'), model, connection, choose);
 
-const playback = new PlaybackBar($('playback'), connection, model);
-connection.onSeek = () => { model.jumped(); log.clear(); };
+const playback = new PlaybackBar($('playback'), connection, model, lookBack);
+const timeline = new TimeLine($('timeline'), model, connection, playback, (group) => log.hides(group), choose);
+connection.onSeek = () => { model.jumped(); log.clear(); playback.sought(); };
+
+/** Shows an earlier time of live data, and its image; without `time`, the present. */
+function lookBack(time) {
+  const then = past.at('objects', time ?? Infinity);
+  if (!then) return;
+  const image = past.at('image', time === undefined ? Infinity : then.time);
+  model.past = time === undefined ? undefined : then.time;
+  camera.frozen = time !== undefined;
+  if (time !== undefined) panel.full = null; // the gateway knows the present only
+  model.show(then.value);
+  world?.setObjects(model);
+  if (image && image.value.view !== camera.shown?.view) camera.show(image.time, image.value).catch((e) => console.warn(`image: ${e.message}`));
+  showState();
+}
 
 function choose(id, { reveal = true, open = true } = {}) {
   world?.choosePart(undefined);
+  wished.object = undefined;
   model.chosen = id;
   world?.choose(id);
+  camera.choose(id);
   panel.show(id);
   list.render();
   if (id !== 0) {
@@ -84,8 +106,13 @@ const overlayTopic = () => cameraTopic.replace(/image$/, camera.likelihood ? 'li
 let showsCamera = true;
 
 connection.on('/objects', (message) => {
-  model.takeObjects(message, performance.now());
-  world?.setObjects(model);
+  if (model.takeObjects(message, performance.now())) {
+    past.clear();
+    camera.frozen = false;
+  }
+  if (!connection.range) past.take('objects', model.newest, message);
+  timeline.take(message, model.newest);
+  if (model.past === undefined) world?.setObjects(model);
 });
 connection.on('/trajectory', (message) => world?.setWay(message.poses));
 connection.on('/landmarks', (message) => world?.setPoints(message));
@@ -114,10 +141,11 @@ const takeSeen = (message) => world?.setSeen(message, model.time);
 connection.on('/map/graph', takeGraph);
 connection.on('/events', (event) => {
   log.add(event);
+  timeline.mark(event, timeOf(event));
   if (event.at && MARKS[event.event]) world?.addMark(event.at, MARKS[event.event], `${event.world}/${event.epoch}`);
 });
 connection.on('/health', (health) => {
-  model.health = health;
+  model.takeHealth(health);
   $('vehicle').textContent = health.vehicle;
   renderServices($('services'), health);
 });
@@ -148,11 +176,11 @@ function questionOf(text) {
 async function askMap() {
   const word = $('search').value.trim();
   const request = questionOf(word);
-  $('list-note').textContent = 'The map is asked …';
+  $('list-note').textContent = 'Waiting for the map …';
   try {
     const reply = await connection.call('/map/query', request);
     const many = reply.truncated ? ', and there are more' : '';
-    setAnswer(reply.objects, reply.objects.length === 0 ? `The map has nothing ${'near' in request ? 'there' : `that is "${word}"`}.` : `The map has ${reply.objects.length}${many}.`);
+    setAnswer(reply.objects, reply.objects.length === 0 ? `The map has no object ${'near' in request ? 'there' : `"${word}"`}.` : `The map has ${reply.objects.length}${many}.`);
   } catch (error) {
     setAnswer(null, `The map does not answer: ${error.message}`);
   }
@@ -196,13 +224,19 @@ const toggles = {
     if (cameraTopic) connection.on(overlayTopic(), (m) => camera.takeAnnotations(m));
     return camera.likelihood;
   },
+  i: () => { camera.enlarge(); return undefined; },
+  r: () => {
+    $('rows').hidden = !$('rows').hidden;
+    timeline.render();
+    return !$('rows').hidden;
+  },
 };
 function toggle(key) {
   const on = toggles[key]();
   if (on !== undefined) document.querySelector(`[data-key=${key}]`).setAttribute('aria-pressed', String(on));
 }
 if (world) world.onFollow = (on) => document.querySelector('[data-key=f]').setAttribute('aria-pressed', String(on));
-$('tools').addEventListener('click', (e) => { if (e.target.dataset.key) toggle(e.target.dataset.key); });
+for (const bar of ['tools', 'time-head']) $(bar).addEventListener('click', (e) => { if (e.target.dataset.key) toggle(e.target.dataset.key); });
 document.querySelector('nav').addEventListener('click', (e) => { if (e.target.dataset.tab) openTab(e.target.dataset.tab); });
 $('state').addEventListener('click', () => openTab('services'));
 $('help-button').addEventListener('click', () => $('help').showModal());
@@ -214,6 +248,8 @@ document.addEventListener('keydown', (e) => {
   if (step) {
     const id = list.next(step);
     if (id) choose(id);
+  } else if (e.key === 'Enter' && e.target.matches('button, li')) {
+    return; // the focused element handles it
   } else if (e.key === 'Enter' && model.chosen) {
     world?.lookAt(model.chosen);
     if (typing) openTab('object');
@@ -221,22 +257,23 @@ document.addEventListener('keydown', (e) => {
     const id = list.next(1);
     if (id) choose(id); else askMap();
   } else if (e.key === 'Escape') {
-    if (typing && $('search').value) { $('search').value = ''; setAnswer(); } else { $('search').blur(); choose(0); openTab('objects'); }
+    if (camera.figure.classList.contains('large')) camera.enlarge(false);
+    else if (typing && $('search').value) { $('search').value = ''; setAnswer(); } else { $('search').blur(); choose(0); openTab('objects'); }
   } else if (typing) {
     return;
   } else if (e.key === '/') {
     openTab('objects');
     $('search').focus();
-  } else if (e.key === ' ' && connection.range && e.target.tagName !== 'BUTTON') {
+  } else if (e.key === ' ' && e.target.tagName !== 'BUTTON') {
     playback.toggle();
-  } else if (e.key.toLowerCase() === 'n' && connection.range) {
-    playback.nextEvent();
+  } else if (e.key.toLowerCase() === 'n') {
+    playback.onward();
   } else if (e.key === '?') {
     $('help').showModal();
   } else if (toggles[e.key.toLowerCase()]) {
     toggle(e.key.toLowerCase());
-  } else if ('1234'.includes(e.key)) {
-    openTab(['objects', 'object', 'events', 'services'][e.key - 1]);
+  } else if ('12345'.includes(e.key)) {
+    openTab(['objects', 'object', 'events', 'services', 'plots'][e.key - 1]);
   } else return;
   e.preventDefault();
 });
@@ -271,9 +308,10 @@ function showState() {
   stateAt = now;
   const [state, sentence] = troubleOf(model, { ...status, playback: connection.playback }, now);
   playback.render();
-  const words = { live: 'live', degraded: 'degraded', stale: 'nothing comes', played: connection.playback?.status ?? '', lost: 'no connection', connecting: 'connecting' };
-  $('state').dataset.state = state;
-  $('state').textContent = words[state];
+  timeline.render();
+  const words = { live: 'live', degraded: 'degraded', stale: 'no data', played: connection.playback?.status ?? '', lost: 'no connection', connecting: 'connecting' };
+  $('state').dataset.state = model.past === undefined ? state : 'stale';
+  $('state').textContent = model.past === undefined ? words[state] : 'paused';
   document.body.dataset.state = state;
   $('trouble').hidden = !sentence;
   $('trouble').classList.toggle('bad', state === 'lost');
@@ -287,7 +325,10 @@ function refresh() {
   if (now4(4)) {
     if (!document.querySelector('[data-panel=objects]').hidden) list.render();
     if (!document.querySelector('[data-panel=object]').hidden && (model.chosen || panel.part)) panel.part ? panel.renderPart() : panel.render();
+    grant();
+    if (!document.querySelector('[data-panel=plots]').hidden) renderPlots($('plots'), model);
     showState();
+    link.write();
   }
   world?.draw();
   requestAnimationFrame(refresh);
@@ -301,6 +342,53 @@ function now4(rate) {
   return true;
 }
 
+// The state of the page in its address. `wished` has what waits for data: an object, a time.
+const LAYERS = ['f', 'e', 'l', 'm', 'g', 's', 'c', 'b', 'r'];
+const isOn = (key) => document.querySelector(`[data-key=${key}]`).getAttribute('aria-pressed') === 'true';
+if (matchMedia('(max-width: 760px)').matches) toggle('r');
+const listed = () => [...$('events-filter').children].filter((b) => b.getAttribute('aria-pressed') === 'true').map((b) => b.dataset.group).join();
+const usualEvents = listed();
+const usual = Object.fromEntries(LAYERS.map((key) => [key, isOn(key)]));
+const wished = {};
+const link = new Link(() => {
+  const { orbit, follow } = world ?? {}, { range } = connection;
+  const view = orbit && !follow && [...orbit.target.toArray(), orbit.azimuth, orbit.polar, orbit.distance].map((x) => x.toFixed(2)).join();
+  return {
+    object: wished.object ?? (model.chosen || undefined),
+    tab: [...document.querySelectorAll('[role=tab]')].find((t) => t.getAttribute('aria-selected') === 'true' && t.dataset.tab !== 'objects')?.dataset.tab,
+    search: $('search').value,
+    layers: LAYERS.filter((key) => isOn(key) !== usual[key]).join(''),
+    events: listed() === usualEvents ? undefined : listed() || 'none',
+    view: view || undefined,
+    t: wished.t ?? (range && !playback.plays ? (playback.time - range.first).toFixed(2) : undefined),
+  };
+}, (state) => {
+  for (const key of LAYERS) if (isOn(key) !== (usual[key] !== (state.layers ?? '').includes(key))) toggle(key);
+  const events = (state.events ?? usualEvents).split(',');
+  for (const b of $('events-filter').children) if ((b.getAttribute('aria-pressed') === 'true') !== events.includes(b.dataset.group)) b.click();
+  $('search').value = state.search ?? '';
+  const view = (state.view ?? '').split(',').map(Number);
+  if (world && view.length === 6 && view.every(Number.isFinite)) {
+    world.lookAtPlace(view.slice(0, 3));
+    [world.orbit.azimuth, world.orbit.polar, world.orbit.distance] = view.slice(3);
+  }
+  wished.object = Number(state.object) || undefined;
+  wished.t = state.t;
+  if (document.querySelector(`[data-panel="${CSS.escape(state.tab ?? '')}"]`)) openTab(state.tab);
+});
+/** Restores what had to wait for data. */
+function grant() {
+  const { range } = connection;
+  if (wished.t !== undefined && range) {
+    playback.seek(range.first + Number(wished.t), false);
+    wished.t = undefined;
+  }
+  if (wished.object && model.find(wished.object)) {
+    choose(wished.object, { open: false });
+  }
+}
+link.open();
+
 // The state of the page, which tests read.
-window.perdure = { model, world, camera, connection, choose, choosePart, opened: performance.now() };
+window.perdure = { model, world, camera, connection, choose, choosePart, lookBack, timeline, playback, opened: performance.now() };
 refresh();

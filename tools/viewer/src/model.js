@@ -1,6 +1,6 @@
 // The state of the page: the newest data, and the objects' history since the page was opened.
 
-const RATE_MS = 5000;
+const RATE_MS = 5000, SAMPLE_S = 0.2, SAMPLES = 1500; // five minutes of samples
 
 export class Model {
   constructor() {
@@ -8,45 +8,79 @@ export class Model {
     this.remembered = new Map(); // id → object, on the map, in M
     this.mapFrame = null; // the newest perdure.MapFrame
     this.graph = null; // the newest perdure.MapGraph
-    this.history = new Map(); // id → [[time, r], …]
+    this.history = new Map(); // id → [[time, r, p, visible fraction, σ], …]
+    this.drive = []; // [[time, speed, latency, position], …]
+    this.cpu = new Map(); // process → [[time, share of a core], …]
     this.chosen = 0;
-    this.frame = null; // the newest perdure.Objects without its objects
+    this.frame = null; // the shown perdure.Objects without its objects
+    this.past = undefined; // of live data: the earlier time that is shown
     this.health = null;
     this.heardAt = 0; // performance.now() of the newest objects
     this.origin = 0; // start of a recording on the sensor clock
     this.arrivals = []; // arrival times of the last seconds
   }
 
+  /** Takes new objects. Returns whether they belong to another W, or to a restarted recording. */
   takeObjects(message, now) {
-    const { objects, ...frame } = message;
-    const time = frame.timestamp.sec + 1e-9 * frame.timestamp.nsec;
-    const world = `${frame.world}/${frame.epoch}`;
-    if (this.world !== undefined && this.world !== world) this.history.clear();
-    const another = this.frame && time < this.time - 2; // whether a recording has restarted
-    if (another) this.history.clear();
-    this.world = world;
-    this.time = time;
-    this.frame = frame;
-    this.objects = new Map(objects.map((o) => [o.id, o]));
+    const time = timeOf(message), world = worldOf(message);
+    const another = this.newest !== undefined && (world !== this.newestWorld || time < this.newest - 2);
+    if (another) this.jumped();
+    this.newest = time;
+    this.newestWorld = world;
     if (this.heardAt > 0) this.live = true; // not for the first message, which may be old
     this.heardAt = now;
     this.arrivals.push(now);
     while (this.arrivals[0] < now - RATE_MS) this.arrivals.shift();
-    for (const o of objects) this.remember(o, time);
+    for (const o of message.objects) this.remember(o, time);
+    this.measure(message, time);
+    if (another) this.past = undefined;
+    if (this.past === undefined) this.show(message);
+    return another;
+  }
+
+  /** Shows objects, also those of an earlier time. */
+  show({ objects, ...frame }) {
+    this.world = worldOf(frame);
+    this.time = timeOf(frame);
+    this.frame = frame;
+    this.objects = new Map(objects.map((o) => [o.id, o]));
+  }
+
+  /** Stores the speed, from the positions of the last half second, and the latency. */
+  measure({ body, latency_ms: latency }, time) {
+    const last = this.drive.at(-1);
+    if (!body || (last && time - last[0] < SAMPLE_S)) return;
+    const from = this.drive.at(-3) ?? last;
+    const speed = from ? Math.hypot(...from[3].map((x, i) => body[i] - x)) / (time - from[0]) : NaN;
+    this.drive.push([time, speed, latency >= 0 ? latency : NaN, body.slice(0, 3)]);
+    if (this.drive.length > SAMPLES) this.drive.shift();
+  }
+
+  takeHealth(health) {
+    this.health = health;
+    for (const { process, cpu } of this.newest === undefined ? [] : health.services) {
+      const samples = this.cpu.get(process) ?? [];
+      if (!(cpu >= 0) || samples.at(-1)?.[0] >= this.newest) continue;
+      samples.push([this.newest, cpu]);
+      if (samples.length > SAMPLES) samples.shift();
+      this.cpu.set(process, samples);
+    }
   }
 
   remember(o, time) {
     let samples = this.history.get(o.id);
     if (!samples) this.history.set(o.id, (samples = []));
     const last = samples.at(-1);
-    if (last && time - last[0] < 0.2 && time >= last[0]) return;
-    samples.push([time, o.r, o.p, o.fraction]);
-    if (samples.length > 1500) samples.shift();
+    if (last && time - last[0] < SAMPLE_S && time >= last[0]) return;
+    samples.push([time, o.r, o.p, o.fraction, Math.sqrt(Math.max(0, o.cov[0], o.cov[3], o.cov[5]))]);
+    if (samples.length > SAMPLES) samples.shift();
   }
 
   /** Clears the data after a jump to another position of a recording. */
   jumped() {
     this.history.clear();
+    this.cpu.clear();
+    this.drive = [];
   }
 
   takeMap(message) {
@@ -108,6 +142,9 @@ export class Model {
   }
 }
 
+export const timeOf = ({ timestamp }) => timestamp.sec + 1e-9 * timestamp.nsec;
+const worldOf = ({ world, epoch }) => `${world}/${epoch}`;
+
 /** Rotates a vector by a quaternion [x y z w]. */
 function turned([a, b, c, w], [x, y, z]) {
   const u = 2 * (b * z - c * y), v = 2 * (c * x - a * z), t = 2 * (a * y - b * x);
@@ -125,7 +162,7 @@ export function troubleOf(model, connection, now) {
   const heard = services.filter((s) => s.age_s < 2.5);
   const capture = heard.find((s) => s.process === 'capture');
   if (heard.length === 0 && silent > 2) {
-    return ['stale', 'No service is heard: do they run, with the same bus.domain, bus.interface and bus.vehicle as the gateway? (perdure status)'];
+    return ['stale', 'No data from any service: do they run, with the same bus.domain, bus.interface and bus.vehicle as the gateway? (perdure status)'];
   }
   // A new client receives the last `objects` once, even if they are old.
   const last = silent > 2 || !model.live;
@@ -134,8 +171,8 @@ export function troubleOf(model, connection, now) {
     const bad = services.filter((s) => s.age_s >= 2.5).map((s) => `${s.process} has been silent for ${Math.round(s.age_s)} s`);
     const said = heard.filter((s) => s.state !== 'ok' && s.message).map((s) => `${s.process}: ${s.message}`);
     const why = [...bad, ...said].slice(0, 3).join('; ');
-    const since = silent === Infinity ? 'No objects have come' : `No objects for ${Math.round(silent)} s`;
-    const playing = heard.length === 0 ? ' Recordings that are played end so.' : '';
+    const since = silent === Infinity ? 'No objects since this page was opened' : `No objects for ${Math.round(silent)} s`;
+    const playing = heard.length === 0 ? ' A played recording ends like this.' : '';
     return ['stale', `${since}${why ? ` (${why})` : ''}.${playing || (why ? '' : ' Is semantic_filter running, and does odometry come?')}`];
   }
   const gone = services.filter((s) => s.age_s >= 2.5);

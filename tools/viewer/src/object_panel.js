@@ -1,4 +1,5 @@
 // Shows all data of one object. While open, requests them from the gateway twice a second.
+import { chart } from './plots.js';
 import { classWords, colourOf, escaped, existenceWords, isHidden, isInSight, percent, visibilityWords } from './words.js';
 
 const EVERY_MS = 500;
@@ -35,7 +36,7 @@ export class ObjectPanel {
     const words = this.part();
     if (words === this.told) return;
     this.told = words;
-    this.element.innerHTML = words || '<p class="empty">The map has it no more.</p>';
+    this.element.innerHTML = words || '<p class="empty">It is not on the map any more.</p>';
   }
 
   show(id) {
@@ -50,7 +51,7 @@ export class ObjectPanel {
   }
 
   async ask() {
-    if (this.id === 0 || this.asking || this.element.closest('section').hidden) return;
+    if (this.id === 0 || this.asking || this.model.past !== undefined || this.element.closest('section').hidden) return;
     const id = this.id;
     this.asking = true;
     try {
@@ -71,7 +72,7 @@ export class ObjectPanel {
   render() {
     const o = this.model.objects.get(this.id) ?? this.full?.object ?? this.model.find(this.id);
     if (!o) {
-      this.element.innerHTML = `<p class="empty">${escaped(this.note || 'It is asked for …')}</p>`;
+      this.element.innerHTML = `<p class="empty">${escaped(this.note || 'Waiting for its data …')}</p>`;
       return;
     }
     // Keeps the content while text is being selected.
@@ -119,8 +120,8 @@ export class ObjectPanel {
       const now = this.model.time ?? returns.said_s;
       const left = returns.in_s.map((s) => Math.max(0, s - (now - returns.said_s)));
       words.push(`It should be seen again in <b>${left[0].toFixed(1)} s</b> (${left[1].toFixed(1)} to ${left[2].toFixed(1)} s).`);
-    } else if (!isInSight(o)) {
-      words.push('When it will be seen again is not known: it is not on the way.');
+    } else if (this.full && !isInSight(o)) {
+      words.push('The next sighting is not predicted.');
     }
     if (o.last_s !== undefined && this.model.time !== undefined && !isInSight(o)) words.push(`Last seen ${Math.max(0, this.model.time - o.last_s).toFixed(1)} s ago.`);
     return words.map((w) => `<p>${w}</p>`).join('');
@@ -130,21 +131,10 @@ export class ObjectPanel {
     const own = this.model.history.get(o.id) ?? [];
     const samples = (this.full?.history?.length ?? 0) > 1 && (own.length === 0 || this.full.history[0][0] < own[0][0]) ? this.full.history : own;
     if (samples.length < 2) return '';
-    const t0 = samples[0][0], t1 = samples.at(-1)[0], span = Math.max(0.1, t1 - t0);
-    const x = (t) => (100 * (t - t0)) / span, y = (p) => 37 - 34 * p;
-    const path = (k) => samples.map((s, i) => `${i ? 'L' : 'M'}${x(s[0]).toFixed(2)} ${y(s[k]).toFixed(2)}`).join('');
-    // The background is darker while the object was not visible.
-    const gaps = [];
-    for (let i = 1; i < samples.length; ++i) {
-      if ((samples[i][3] ?? 1) > 0.05) continue;
-      gaps.push(`<rect x="${x(samples[i - 1][0]).toFixed(2)}" y="0" width="${(x(samples[i][0]) - x(samples[i - 1][0])).toFixed(2)}" height="40" fill="#ffd98a" opacity=".13"/>`);
-    }
-    return `<h3>Existence and class over the last ${span.toFixed(0)} s</h3>
-      <svg viewBox="0 0 100 40" preserveAspectRatio="none" role="img" aria-label="Existence over time">${gaps.join('')}
-      <path d="M0 3H100M0 20H100M0 37H100" stroke="#26313d" stroke-width=".4"/>
-      <path d="${path(2)}" fill="none" stroke="#8b9aa8" stroke-width="1.2" vector-effect="non-scaling-stroke"/>
-      <path d="${path(1)}" fill="none" stroke="${colourOf(o.class)}" stroke-width="2" vector-effect="non-scaling-stroke"/></svg>
-      <p class="dim">coloured: exists; grey: ${escaped(o.class)}; shaded: it could not be seen</p>`;
+    // The background is coloured while the object was not visible.
+    const unseen = samples.slice(1).flatMap((s, i) => ((s[3] ?? 1) > 0.05 ? [] : [[samples[i][0], s[0]]]));
+    const line = (name, k, colour) => ({ name, colour, samples: samples.map((s) => [s[0], s[k]]) });
+    return chart('Existence and class', [line(escaped(o.class), 2, '#8b9aa8'), line('exists', 1, colourOf(o.class))], { high: 1, say: percent, shaded: unseen, cursor: this.model.past });
   }
 
   classes() {
@@ -166,7 +156,7 @@ export class ObjectPanel {
     const sum = rows.reduce((s, [, e]) => s + e.nats, 0);
     const signed = (n) => (Math.abs(n) < 0.005 ? '0' : `${n > 0 ? '+' : '−'}${Math.abs(n).toFixed(2)}`);
     const lines = rows.map(([kind, e]) => `<tr><td>${ObjectPanel.swing(e.nats, most)}</td><td class="n">${signed(e.nats)}</td><td>${escaped(existenceWords(kind, e.count))}</td></tr>`);
-    return `<h3>Why it is believed to exist (nats)</h3><table class="ledger">${lines.join('')}
+    return `<h3>Evidence that it exists (nats)</h3><table class="ledger">${lines.join('')}
       <tr><td></td><td class="n"><b>${signed(sum)}</b></td><td><b>log-odds: ${percent(1 / (1 + Math.exp(-sum)))}</b></td></tr></table>`;
   }
 
@@ -181,7 +171,7 @@ export class ObjectPanel {
       title = `Why it is a ${first.class} rather than ${second.class}`;
     } else if (ousted) {
       nats = Object.entries(ousted.nats);
-      title = `Why ${ousted.class} was given up for ${ousted.by}`;
+      title = `Why ${ousted.class} was replaced by ${ousted.by}`;
     } else return '';
     nats = nats.filter(([, n]) => Math.abs(n) >= 0.005);
     if (nats.length === 0) return '';

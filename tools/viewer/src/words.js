@@ -40,12 +40,12 @@ export function existenceWords(kind, n) {
     hit: `detected in ${observations(n)}`,
     repeated: `detected in ${observations(n)} more from the same place: little weight`,
     miss: `not detected in ${observations(n)} of its place`,
-    screened: 'of these excused: an object that is not on the map may have occluded it',
+    screened: 'correction of these: an object that is not on the map may have occluded it',
     hidden: `${observations(n)} not used: it was occluded`,
     away: `${observations(n)} not used: it was out of view`,
     time: 'time passed: objects leave',
     misshapen: `${hypotheses(n)} removed: no longer of the size of their class`,
-    lost: `${hypotheses(n)} removed: that it drove off unseen`,
+    lost: `${hypotheses(n)} removed: that it left without being seen`,
     shared: "its first box may have been another object's",
     merge: `merged ${times(n)} with an object that was the same`,
     restore: `back from a restart ${times(n)}: evidence from before this ledger`,
@@ -88,12 +88,14 @@ export const MARKS = { loop_closed: '#c58cff', relocalised: '#9fe5bf', loop_with
 
 /** Styles of the map's loops; the gateway uses the same colours. */
 export const LOOPS = {
-  confirmed: { colour: '#c58cff', dashed: false, words: 'A place was found again, and the map believes it.' },
+  confirmed: { colour: '#c58cff', dashed: false, words: 'A place was recognised, and the map uses the loop.' },
   tie: { colour: '#40bfad', dashed: false, words: 'The place was tied to the map by objects that still had their ids.' },
-  tentative: { colour: '#f5bf40', dashed: true, words: 'A place may have been found again: the map does not believe it, or not yet.' },
-  withdrawn: { colour: '#ff8f88', dashed: true, words: 'Later loops contradict it: it was taken back, and what it had merged is two again.' },
+  tentative: { colour: '#f5bf40', dashed: true, words: 'A place may have been recognised. The map does not use the loop, or not yet.' },
+  withdrawn: { colour: '#ff8f88', dashed: true, words: 'Later loops contradict it. It was retracted, and the objects that it merged are separate again.' },
 };
 export const lookOfLoop = (loop) => (loop.state !== 'confirmed' ? loop.state : loop.kind === 'tie' ? 'tie' : 'confirmed');
+
+export const wordsOf = (o) => `${o.class} ${o.id}`;
 
 /** Escapes a text for HTML. */
 export const escaped = (text) => String(text).replace(/[&<>"']/g, (c) => `&#${c.codePointAt(0)};`);
@@ -110,8 +112,8 @@ export function wordsOfImage(state, older) {
 export function wordsOfNoImage(state, { recorded, openFor, heard }) {
   if (recorded === 'without') return 'the recording has no images: perdure record --images keeps them';
   if (recorded || state === 'lost' || state === 'connecting' || openFor < 3) return 'no image yet';
-  const none = 'No image has come since this page is open';
-  if (!heard) return `${none}: capture is not heard.`;
+  const none = 'No image since this page was opened';
+  if (!heard) return `${none}: no data from capture.`;
   return state === 'stale' ? `${none}: the camera has stopped.` : `${none}: is the camera in image.cameras of the gateway?`;
 }
 

@@ -2,6 +2,7 @@
 import * as THREE from './vendor/three.module.js';
 import { Graph } from './graph.js';
 import { Orbit } from './orbit.js';
+import { roundUp } from './plots.js';
 import { Thing } from './things.js';
 import { colourOf, colourOfAge, looksLike } from './words.js';
 
@@ -13,6 +14,7 @@ export class World {
     this.canvas = canvas;
     this.labels = labels;
     this.toolbar = document.getElementById('tools'); // labels of objects avoid this toolbar
+    [this.compass, this.scaleBar] = document.getElementById('scale').children;
     this.onPick = onPick;
     this.onPart = onPart;
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, powerPreference: 'low-power' });
@@ -101,7 +103,8 @@ export class World {
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
-    this.dirty = true;
+    this.dirty = true; // at once, because the canvas is empty now
+    this.restsUntil = 0;
   }
 
   setFollow(on) {
@@ -363,6 +366,7 @@ export class World {
     this.orbit.apply();
     this.renderer.render(this.scene, this.camera);
     this.drawNames();
+    this.drawScale();
     this.drewAt = now;
     ++this.drawn;
   }
@@ -383,6 +387,17 @@ export class World {
     this.slow = 0;
     this.renderer.setPixelRatio(Math.max(0.5, 0.7 * ratio));
     this.resize();
+  }
+
+  /** Shows the length of a bar at the target of the view, and the direction of x of M. */
+  drawScale() {
+    const metres = 2 * this.orbit.distance * Math.tan((Math.PI * this.camera.fov) / 360), perPixel = metres / this.canvas.clientHeight;
+    const length = roundUp(60 * perPixel), words = `${length} m`;
+    this.scaleBar.style.width = `${(length / perPixel).toFixed(0)}px`;
+    if (this.scaleBar.textContent !== words) this.scaleBar.textContent = words;
+    const x = new THREE.Vector3(1, 0, 0).applyQuaternion(this.map.quaternion);
+    const turn = this.orbit.azimuth + Math.PI - Math.atan2(x.y, x.x); // clockwise from the view's forward direction
+    this.compass.querySelector('path').setAttribute('transform', `rotate(${((180 * turn) / Math.PI).toFixed(0)})`);
   }
 
   drawNames() {

@@ -62,7 +62,7 @@ const words = await page.evaluate(async () => {
 });
 check(/σ in map\s*not known/.test(words.figures), `how well the place is known is not known (${words.figures})`);
 check(words.live === '' && words.late.includes('3.0 s before') && words.last === 'the last image' && words.place === '0.25 m', `an image that is old (${JSON.stringify(words)})`);
-check(words.ended.includes('since this page is open: the camera has stopped') && words.silent.includes('capture is not heard') && words.opened === 'no image yet', `no image (${JSON.stringify(words)})`);
+check(words.ended.includes('since this page was opened: the camera has stopped') && words.silent.includes('no data from capture') && words.opened === 'no image yet', `no image (${JSON.stringify(words)})`);
 
 // The rate of objects must be right even if several arrive at once; names must not be covered by
 // buttons.
@@ -101,7 +101,7 @@ await page.evaluate(() => { window.clicked = performance.now(); document.querySe
 await page.waitForFunction(() => document.querySelector('#object .pmf') && document.querySelector('#object .ledger'), { timeout: 20000, polling: 10 });
 figures.click_ms = await page.evaluate(() => Math.round(window.perdure_panel_latency ?? performance.now() - window.clicked));
 const text = await page.$eval('#object', (e) => e.innerText);
-for (const words of ['exists', 'WHAT IT IS', 'WHY IT IS BELIEVED TO EXIST', 'detected in', 'WHERE IT IS', 'COVARIANCE']) check(text.includes(words), `the panel says "${words}"`);
+for (const words of ['exists', 'WHAT IT IS', 'EVIDENCE THAT IT EXISTS', 'detected in', 'WHERE IT IS', 'COVARIANCE']) check(text.includes(words), `the panel says "${words}"`);
 await pause(700);
 await page.screenshot({ path: join(out, 'object.png') });
 
@@ -342,14 +342,127 @@ check(await page.evaluate(() => ![...window.perdure.connection.topics.values()].
 check(await page.evaluate(() => window.perdure.world.seen.visible) === false, 'S again: no ground is coloured');
 check(await page.evaluate(() => [...window.perdure.world.things.values()][0].material.color.getHexString()) === classColour, 'S again: the colour of the class');
 
+// The time line: a row for each object, marks of events by the filter, and earlier times of live data.
+await page.keyboard.press('1');
+const rows = await page.evaluate(() => [...document.querySelectorAll('#rows button')].map((r) => r.getAttribute('aria-label')).sort().join());
+check(rows === 'car 1 in sight,car 2 in sight,car 3 hidden', `rows of the time line (${rows})`);
+await page.click('#rows [data-id="2"]');
+check(await page.evaluate(() => window.perdure.model.chosen) === 2, 'a click on a row selects the object');
+const marks = await page.evaluate(() => {
+  const { timeline, model } = window.perdure, filter = document.querySelector('#events-filter [data-group=map]');
+  timeline.mark({ event: 'loop_closed', object_id: 0, words: 'a loop' }, model.newest);
+  timeline.mark({ event: 'gone', object_id: 9, words: 'gone' }, model.newest);
+  const all = timeline.shownMarks().length;
+  filter.click();
+  const without = timeline.shownMarks().length;
+  filter.click();
+  return [all, without];
+});
+check(marks[0] > 1 && marks[1] === marks[0] - 1, `the filter hides marks (${marks})`);
+const shownTime = () => page.evaluate(() => { const { model } = window.perdure; return { past: model.past, time: model.time, newest: model.newest, image: window.perdure.camera.shown.time, words: document.getElementById('playback').innerText }; });
+await page.evaluate(() => document.activeElement.blur());
+await page.keyboard.press(' ');
+const stopped = await shownTime();
+await pause(1500);
+const later = await shownTime();
+check(later.time === stopped.time && later.newest > stopped.newest && /ago/.test(later.words), `space stops the page, not the data (${JSON.stringify([stopped, later])})`);
+const axis = await (await page.$('#axis')).boundingBox();
+await page.mouse.move(axis.x + axis.width - 8, axis.y + 13);
+await page.mouse.down();
+await page.mouse.move(axis.x + axis.width - 8 - (axis.width - 104) / 10, axis.y + 13, { steps: 4 }); // 6 s
+await page.mouse.up();
+await pause(600);
+const scrubbed = await shownTime();
+check(Math.abs(scrubbed.newest - scrubbed.time - 6) < 2 && Math.abs(scrubbed.image - scrubbed.time) < 1, `6 s before now, with the image (${JSON.stringify(scrubbed)})`);
+await page.screenshot({ path: join(out, 'scrubbed.png') });
+figures.scrub_hz = await page.evaluate(async () => {
+  const { lookBack, model, world } = window.perdure, began = performance.now(), drawn = world.drawn;
+  for (let i = 0; performance.now() - began < 2000; ++i) {
+    lookBack(model.newest - (i % 100) / 10);
+    await new Promise(requestAnimationFrame);
+  }
+  return Math.round((1000 * (world.drawn - drawn)) / (performance.now() - began));
+});
+await page.keyboard.press('n');
+await pause(300);
+check(await page.evaluate(() => window.perdure.model.past === undefined && window.perdure.model.time === window.perdure.model.newest), 'N: back to the present');
+
+// Of several seeks of a recording, the first and the last are sent.
+const seeks = await page.evaluate(async () => {
+  const { PlaybackBar } = await import('./playback.js');
+  const sent = [], connection = { range: { first: 100, last: 160 }, playback: { status: 'paused', time: 100, speed: 1 }, control: (play, speed, seek) => sent.push(seek) };
+  const bar = new PlaybackBar(document.createElement('div'), connection, { time: 100 }, () => {});
+  for (const time of [110, 120, 130]) bar.seek(time);
+  const at = bar.time;
+  bar.sought();
+  bar.sought();
+  return [...sent, at].join();
+});
+check(seeks === '110,130,130', `seeks that are sent, and the shown time (${seeks})`);
+
+// The image: a click on an outline selects the object, another click enlarges the image.
+await page.keyboard.press('Escape');
+const boxAt = await page.evaluate(() => {
+  const { camera } = window.perdure, [l, t, r, b] = camera.outlines().find((o) => o.id === 1).box, { left, top } = camera.canvas.getBoundingClientRect();
+  return [left + (camera.scale() * (l + r)) / 2, top + (camera.scale() * (t + b)) / 2];
+});
+await page.mouse.click(...boxAt);
+await pause(300);
+check(await page.evaluate(() => window.perdure.model.chosen === 1 && window.perdure.camera.chosen === 1 && window.perdure.world.things.get(1).chosen), 'a click on an outline selects its object in both views');
+await page.click('#image', { offset: { x: 5, y: 5 } });
+check(await page.$eval('#image', (e) => e.clientWidth) > 600, 'a click elsewhere enlarges the image');
+await page.screenshot({ path: join(out, 'image.png') });
+await page.keyboard.press('Escape');
+check(await page.$eval('#camera', (e) => !e.classList.contains('large')), 'Esc ends that');
+
+// Plots, and the scale of the map.
+await page.keyboard.press('5');
+await pause(600);
+const plots = await page.$eval('#plots', (e) => [e.innerText, e.querySelectorAll('path[stroke-width="1.6"]').length]);
+check(/σ of car 1 .*Speed .*m\/s.*Latency.*CPU/s.test(plots[0]) && plots[1] >= 3, `plots (${plots})`);
+await page.screenshot({ path: join(out, 'plots.png') });
+const scale = await page.evaluate(() => {
+  const { world } = window.perdure, { orbit, camera, canvas } = world;
+  orbit.apply();
+  camera.updateMatrixWorld();
+  world.drawScale();
+  const length = parseFloat(world.scaleBar.textContent), end = orbit.target.clone();
+  end.x -= Math.sin(orbit.azimuth) * length; // to the side
+  end.y += Math.cos(orbit.azimuth) * length;
+  const turn = () => Number(/-?\d+/.exec(world.compass.querySelector('path').getAttribute('transform'))[0]), before = turn();
+  const pixels = (Math.abs(end.project(camera).x) * canvas.clientWidth) / 2, width = world.scaleBar.offsetWidth;
+  orbit.azimuth += Math.PI / 2;
+  world.drawScale();
+  return { pixels, width, turned: turn() - before };
+});
+check(Math.abs(scale.pixels - scale.width) < 3 && Math.abs(scale.turned - 90) < 2, `the scale, and the direction of x (${JSON.stringify(scale)})`);
+
+// With an object selected, Enter still presses a focused button.
+await page.focus('[data-tab=events]');
+await page.keyboard.press('Enter');
+check(await page.$eval('[data-panel=events]', (e) => !e.hidden), 'Enter on a button');
+
+// The address restores the state, without new entries of the history.
+await page.click('[data-key=e]');
+await pause(1600);
+const hash = await page.evaluate(() => location.hash);
+check(/object=1/.test(hash) && /tab=events/.test(hash) && /layers=e/.test(hash) && await page.evaluate(() => history.length) <= 2, `the state in the address (${hash})`);
+await page.reload({ waitUntil: 'domcontentloaded' });
+await page.waitForFunction(() => window.perdure?.model.chosen === 1, { timeout: 60000, polling: 100 }).catch(() => {});
+const restored = await page.evaluate(() => ({ chosen: window.perdure.model.chosen, ellipsoids: window.perdure.world.shows.ellipsoids, events: !document.querySelector('[data-panel=events]').hidden }));
+check(restored.chosen === 1 && !restored.ellipsoids && restored.events, `a link restores the state (${JSON.stringify(restored)})`);
+await page.click('[data-tab=objects]');
+
 // Tests the layout on a phone.
 await page.setViewport({ width: 390, height: 844, isMobile: true, hasTouch: true, deviceScaleFactor: 1 });
 await page.waitForFunction(() => window.perdure?.world?.things.size > 0 && window.perdure.world.drawn > 0, { timeout: 120000 });
 await pause(1500);
 const wide = await page.evaluate(() => document.documentElement.scrollWidth > innerWidth + 1);
 check(!wide, 'nothing sticks out at the side of a phone');
-const small = await page.$$eval('button', (all) => all.filter((b) => b.offsetHeight > 0 && b.offsetHeight < 44).map((b) => b.textContent));
+const small = await page.$$eval('button, select, #axis', (all) => all.filter((b) => b.offsetHeight > 0 && b.offsetHeight < 44).map((b) => b.id || b.textContent));
 check(small.length === 0, `buttons that are small for a finger (${small})`);
+const parts = await page.evaluate(() => ['view', 'camera', 'timeline'].map((id) => document.getElementById(id).getBoundingClientRect()).map((r) => [r.top, r.bottom]));
+check(parts[0][1] <= parts[1][0] + 1 && parts[1][1] <= parts[2][0] + 1, `the image is below the map, and the time line below the image (${parts})`);
 await page.screenshot({ path: join(out, 'phone.png') });
 await page.evaluate(() => document.querySelector('#list tr')?.click());
 await pause(900);
