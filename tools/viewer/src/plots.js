@@ -42,7 +42,7 @@ export function renderPlots(element, model) {
   const unit = (digits, name) => (v) => `${v.toFixed(digits)} ${name}`;
   const line = (name, samples, k, colour = COLOURS[0]) => ({ name, colour, samples: samples.map((s) => [s[0], s[k]]) });
   const sigma = o ? model.history.get(o.id) ?? [] : [];
-  element.innerHTML = chart(o ? `σ of ${escaped(wordsOf(o))}` : 'σ of an object', [line('largest of x, y, z', sigma, 4)], { say: unit(2, 'm'), cursor, none: o ? 'no data yet' : 'Select an object.' })
+  element.innerHTML = chart(o ? `Standard deviation of ${escaped(wordsOf(o))}` : 'Standard deviation of an object', [line('largest of x, y, z', sigma, 4)], { say: unit(2, 'm'), cursor, none: o ? 'no data yet' : 'Select an object.' })
     + chart('Speed', [line('vehicle', model.drive, 1)], { say: unit(1, 'm/s'), least: 1, cursor })
     + chart('Latency', [line('from capture to objects', model.drive, 2)], { say: unit(0, 'ms'), least: 10, cursor, none: played ? 'A recording has no latency.' : 'no data yet' })
     + chart('CPU', [...model.cpu].map(([process, samples], i) => line(escaped(process), samples, 1, COLOURS[i % COLOURS.length])), { say: (v) => `${(100 * v).toFixed(0)} %`, cursor, none: played ? 'The recording has no topic health.' : 'no data yet' });

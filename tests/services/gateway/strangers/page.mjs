@@ -419,7 +419,7 @@ check(await page.$eval('#camera', (e) => !e.classList.contains('large')), 'Esc e
 await page.keyboard.press('5');
 await pause(600);
 const plots = await page.$eval('#plots', (e) => [e.innerText, e.querySelectorAll('path[stroke-width="1.6"]').length]);
-check(/σ of car 1 .*Speed .*m\/s.*Latency.*CPU/s.test(plots[0]) && plots[1] >= 3, `plots (${plots})`);
+check(/Standard deviation of car 1 .*Speed .*m\/s.*Latency.*CPU/s.test(plots[0]) && plots[1] >= 3, `plots (${plots})`);
 await page.screenshot({ path: join(out, 'plots.png') });
 const scale = await page.evaluate(() => {
   const { world } = window.perdure, { orbit, camera, canvas } = world;
