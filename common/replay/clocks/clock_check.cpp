@@ -1,4 +1,4 @@
-#include "common/replay/clock_check.h"
+#include "common/replay/clocks/clock_check.h"
 
 #include <fmt/format.h>
 
@@ -8,9 +8,9 @@
 #include <optional>
 
 #include "common/base/algorithms/median.h"
+#include "common/replay/clocks/stamp_rhythm.h"
 #include "common/replay/files/stamps.h"
 #include "common/replay/recording.h"
-#include "common/replay/stamp_rhythm.h"
 
 namespace perdure::replay {
 namespace {

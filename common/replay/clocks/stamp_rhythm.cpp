@@ -1,4 +1,4 @@
-#include "common/replay/stamp_rhythm.h"
+#include "common/replay/clocks/stamp_rhythm.h"
 
 #include <fmt/format.h>
 
