@@ -9,7 +9,7 @@
 
 #include "common/base/algorithms/median.h"
 #include "common/base/errors.h"
-#include "common/replay/clocks/clock_check.h"
+#include "common/replay/clock_check.h"
 #include "common/replay/image_check.h"
 #include "common/vision/decode.h"
 #include "common/vision/image.h"

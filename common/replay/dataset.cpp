@@ -9,7 +9,7 @@
 #include "common/base/algorithms/median.h"
 #include "common/base/errors.h"
 #include "common/base/files/access.h"
-#include "common/replay/clocks/clock_check.h"
+#include "common/replay/clock_check.h"
 #include "common/replay/files/rig_file.h"
 #include "common/replay/files/stamps.h"
 #include "common/replay/files/text_file.h"

@@ -11,7 +11,7 @@
 #include "common/base/errors.h"
 #include "common/replay/files/rig_file.h"
 #include "common/replay/recording.h"
-#include "common/replay/ros_topics.h"
+#include "common/replay/recordings/ros_topics.h"
 #include "common/ros/images.h"
 #include "common/ros/sensors.h"
 #include "common/vision/decode.h"

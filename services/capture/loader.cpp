@@ -4,7 +4,7 @@
 
 #include "common/base/errors.h"
 #include "common/replay/data_check.h"
-#include "common/replay/ros_topics.h"
+#include "common/replay/recordings/ros_topics.h"
 #include "common/vision/jpeg.h"
 
 namespace perdure::capture {

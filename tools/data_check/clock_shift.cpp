@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/replay/clocks/clock_check.h"
+#include "common/replay/clock_check.h"
 
 namespace perdure::tools {
 namespace {

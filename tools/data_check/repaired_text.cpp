@@ -12,7 +12,7 @@
 #include "common/base/algorithms/median.h"
 #include "common/base/checked_file.h"
 #include "common/base/errors.h"
-#include "common/replay/clocks/clock_check.h"
+#include "common/replay/clock_check.h"
 #include "common/replay/files/stamps.h"
 #include "common/replay/files/text_file.h"
 

@@ -14,7 +14,7 @@
 #include "common/base/errors.h"
 #include "common/base/ids.h"
 #include "common/base/subprocess.h"
-#include "common/replay/ros_topics.h"
+#include "common/replay/recordings/ros_topics.h"
 #include "common/types/health.h"
 #include "tools/data_check/data_check.h"
 #include "tools/evaluate/object_report.h"

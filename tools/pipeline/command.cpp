@@ -9,7 +9,7 @@
 #include <string>
 
 #include "common/base/errors.h"
-#include "common/replay/ros_topics.h"
+#include "common/replay/recordings/ros_topics.h"
 #include "tools/calibrate/motion/from_motion.h"
 #include "tools/data_check/data_check.h"
 #include "tools/outputs/results_folder.h"

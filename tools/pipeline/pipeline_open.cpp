@@ -4,7 +4,7 @@
 #include "common/base/errors.h"
 #include "common/replay/files/class_aliases.h"
 #include "common/replay/files/output_place.h"
-#include "common/replay/ros_topics.h"
+#include "common/replay/recordings/ros_topics.h"
 #include "services/semantic_filter/priors.h"
 #include "tools/base/config_folder.h"
 #include "tools/evaluate/simulated_truth.h"

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "common/camera/camera_model.h"
-#include "common/replay/clocks/clock_check.h"
+#include "common/replay/clock_check.h"
 #include "common/replay/dataset.h"
 #include "common/replay/files/kitti_calibration.h"
 #include "common/replay/files/kitti_labels.h"

@@ -11,7 +11,7 @@
 
 #include "common/replay/dataset.h"
 #include "common/replay/recordings/ros_messages.h"
-#include "common/replay/ros_topics.h"
+#include "common/replay/recordings/ros_topics.h"
 #include "tests/common/replay/ros_twin.h"
 #include "tests/common/replay/tiny_datasets.h"
 

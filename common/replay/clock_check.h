@@ -13,8 +13,8 @@ void settleClocks(Recording& recording);
 
 /// Checks the clocks of a recording. Codes: clock_wrapped, clock_set, clock_set_alone,
 /// clock_paused, stamps_equal, stamps_count (an index instead of a time), stamps_unit,
-/// clocks_apart, declared_rates, imu_covers_part, imu_rate and those of stamp_rhythm.h. After a
-/// fatal finding, ranges and rates are not checked.
+/// clocks_apart, declared_rates, imu_covers_part, imu_rate, stamps_of_arrival and imu_bursts. After
+/// a fatal finding, ranges and rates are not checked.
 DataFindings checkClocks(const Recording& recording, const DataUse& use);
 
 /// Adds only the findings about changes in mid-drive: clock_wrapped, clock_set, clock_set_alone and

@@ -1,4 +1,4 @@
-#include "common/replay/ros_topics.h"
+#include "common/replay/recordings/ros_topics.h"
 
 #include <fmt/format.h>
 

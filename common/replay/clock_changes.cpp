@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/replay/clocks/clock_check.h"
+#include "common/replay/clock_check.h"
 #include "common/replay/files/stamps.h"
 #include "common/replay/recording.h"
 

@@ -1,4 +1,4 @@
-#include "common/replay/clocks/clock_check.h"
+#include "common/replay/clock_check.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
