@@ -201,13 +201,21 @@ std::vector<double> intervalsOf(const std::vector<TimePoint>& stamps) {
 /// shortens the next one, so that their covariance is its negative variance.
 double latencyIn(const std::vector<double>& intervals, double usual) {
   constexpr double kPause = 6.0;  // intervals
-  double sum = 0.0, count = 0.0;
+  double mean = 0.0, sum = 0.0, squares = 0.0, count = 0.0;
+  std::vector<std::pair<double, double>> pairs;
   for (std::size_t i = 1; i < intervals.size(); ++i) {
-    const double a = intervals[i - 1] - usual, b = intervals[i] - usual;
-    if (std::max(a, b) > kPause * usual) continue;
-    sum -= a * b, count += 1.0;
+    if (std::max(intervals[i - 1], intervals[i]) > (1.0 + kPause) * usual) continue;
+    pairs.emplace_back(intervals[i - 1], intervals[i]);
+    mean += intervals[i], count += 1.0;
   }
-  return std::sqrt(std::max(0.0, sum / std::max(1.0, count)));
+  mean /= std::max(1.0, count);
+  for (const auto& [a, b] : pairs) {
+    const double product = (a - mean) * (b - mean);
+    sum -= product, squares += product * product;
+  }
+  // Independent intervals have no covariance, except by chance.
+  constexpr double kSurely = 4.0;
+  return sum < kSurely * std::sqrt(squares) ? 0.0 : std::sqrt(sum / count);
 }
 
 /// Adds stamps_of_arrival if a long interval of the images is followed by a short one, as a latency
@@ -216,9 +224,15 @@ double latencyIn(const std::vector<double>& intervals, double usual) {
 void checkArrival(const std::vector<TimePoint>& images, DataFindings& findings) {
   constexpr std::size_t kFewestIntervals = 30;
   constexpr double kLeast_s = 0.005, kShare = 0.08, kLow = 0.95, kHigh = 1.05, kIrregular = 0.3;
+  constexpr double kWhole = 0.1, kMostWhole = 0.9;  // regular images, some of which were dropped
   const auto intervals = intervalsOf(images);
   if (intervals.size() < kFewestIntervals) return;
   const double usual = medianOf(std::vector<double>(intervals));
+  const double least_s = std::ranges::min(intervals);
+  const auto whole = std::ranges::count_if(intervals, [&](double one) {
+    return std::abs(one / least_s - std::round(one / least_s)) < kWhole;
+  });
+  if (static_cast<double>(whole) > kMostWhole * static_cast<double>(intervals.size())) return;
   const double latency = latencyIn(intervals, usual);
   const auto irregular = std::ranges::count_if(
       intervals, [&](double one) { return one < kLow * usual || one > kHigh * usual; });
@@ -252,6 +266,8 @@ bool checkBursts(const std::vector<TimePoint>& imu, DataFindings& findings) {
   const auto samples = static_cast<double>(firsts.back() - firsts.front());
   const double packet = samples / static_cast<double>(firsts.size() - 1),
                usual_ms = 1e3 * toSeconds(imu[firsts.back()] - imu[firsts.front()]) / samples;
+  constexpr double kMost = 100.0, kLongest_ms = 500.0;  // more are recorded at intervals
+  if (packet > kMost || usual_ms * packet > kLongest_ms) return false;
   findings.push_back(
       {DataFinding::Grade::kWarning, "imu_bursts",
        fmt::format("{:.0f} % of the inertial samples come {:.2g} ms after another, then none for "

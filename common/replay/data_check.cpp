@@ -146,37 +146,64 @@ double axisValue(const ImuSample& sample, Eigen::Index axis) {
   return axis < 3 ? sample.gyro[axis] : sample.accel[axis - 3];
 }
 
+/// How an axis of the IMU behaves at its largest value.
+struct AtMost {
+  double most = 0.0, step = 0.0;  ///< largest absolute value; smallest change
+  std::size_t samples = 0;        ///< at the largest value
+  std::size_t times = 0;          ///< number of separate episodes
+  std::size_t stays = 0;          ///< samples after another one there, while other axes change
+  std::size_t near = 0;           ///< samples slightly below
+  bool positive = false, negative = false;
+};
+
+AtMost atMost(const std::vector<ImuSample>& samples, Eigen::Index axis) {
+  constexpr double kNear = 0.85;
+  AtMost all;
+  for (const auto& sample : samples)
+    all.most = std::max(all.most, std::abs(axisValue(sample, axis)));
+  all.step = all.most;
+  for (std::size_t i = 1; i < samples.size(); ++i) {
+    const double value = axisValue(samples[i], axis), before = axisValue(samples[i - 1], axis);
+    if (value != before) all.step = std::min(all.step, std::abs(value - before));
+    if (std::abs(value) < all.most) {
+      all.near += std::abs(value) > kNear * all.most ? 1 : 0;
+      continue;
+    }
+    ++all.samples;
+    (value > 0.0 ? all.positive : all.negative) = true;
+    const bool changed = axis < 3 ? samples[i].accel != samples[i - 1].accel
+                                  : samples[i].gyro != samples[i - 1].gyro;
+    all.times += std::abs(before) < all.most ? 1 : 0;
+    all.stays += changed && std::abs(before) == all.most ? 1 : 0;
+  }
+  return all;
+}
+
 /// Adds imu_saturated if an axis stays at its largest value, which it should only touch, while the
 /// others change.
 void checkSaturated(const std::vector<ImuSample>& samples, DataFindings& findings) {
-  constexpr std::size_t kFewestAtMost = 10, kShareAtMost = 200;
-  constexpr double kNear = 0.85, kLeast_rad_s = 0.1;
+  constexpr std::size_t kFewestAtMost = 10, kShare = 200, kFewestTimes = 3;
+  constexpr double kLeast_rad_s = 0.1, kLeast_m_s2 = 2.0;
+  constexpr double kResolution = 20.0;  // largest value, in steps of the sensor
   for (Eigen::Index axis = 0; axis < 6; ++axis) {
-    double most = 0.0;
-    for (const auto& sample : samples) most = std::max(most, std::abs(axisValue(sample, axis)));
-    std::size_t at_most = 0, stays = 0, near = 0;
-    for (std::size_t i = 1; i < samples.size(); ++i) {
-      const double value = std::abs(axisValue(samples[i], axis));
-      if (value < most) {
-        near += value > kNear * most ? 1 : 0;
-        continue;
-      }
-      ++at_most;
-      const bool changed = axis < 3 ? samples[i].accel != samples[i - 1].accel
-                                    : samples[i].gyro != samples[i - 1].gyro;
-      stays += changed && std::abs(axisValue(samples[i - 1], axis)) == most ? 1 : 0;
-    }
-    const bool few = at_most < kFewestAtMost || kShareAtMost * at_most < samples.size(),
-               still = axis < 3 && most < kLeast_rad_s;
-    if (few || still || 2 * at_most > samples.size() || 2 * stays < at_most || at_most < near)
+    const AtMost at = atMost(samples, axis);
+    const bool few = at.samples < kFewestAtMost || kShare * at.samples < samples.size(),
+               still = at.most < (axis < 3 ? kLeast_rad_s : kLeast_m_s2),
+               coarse = at.most < kResolution * at.step || at.times < kFewestTimes;
+    if (few || still || coarse || 2 * at.samples > samples.size() || 2 * at.stays < at.samples ||
+        at.samples < at.near)
       continue;
     findings.push_back(
         {Grade::kWarning, "imu_saturated",
-         fmt::format("the {} reads exactly ±{:.4g} {} about {} in {} samples ({:.0f} %) and never "
-                     "more: it is saturated; set a larger range of the sensor",
-                     axis < 3 ? "gyroscope" : "accelerometer", most, axis < 3 ? "rad/s" : "m/s²",
-                     "xyz"[axis % 3], at_most,
-                     100.0 * static_cast<double>(at_most) / static_cast<double>(samples.size()))});
+         fmt::format(
+             "the {} reads exactly {}{:.4g} {} about {} in {} samples ({:.0f} %) and never "
+             "more: it is saturated; set a larger range of the sensor",
+             axis < 3 ? "gyroscope" : "accelerometer",
+             at.positive && at.negative ? "±"
+             : at.negative              ? "-"
+                                        : "",
+             at.most, axis < 3 ? "rad/s" : "m/s²", "xyz"[axis % 3], at.samples,
+             100.0 * static_cast<double>(at.samples) / static_cast<double>(samples.size()))});
     return;
   }
 }

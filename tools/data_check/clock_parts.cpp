@@ -56,8 +56,12 @@ std::optional<PartOffset> offsetOf(TurnsAt first, TurnsAt last, const TurnIntegr
   const double vertex = 0.5 * (best[-1] - best[1]) / bend;
   const auto step = static_cast<double>(best - left.begin() - kSteps);
   const auto count = static_cast<double>(last - first);
+  // The rotation between two images is not known more exactly in time than by a part of its span.
+  constexpr double kOfInterval = 0.05;
+  const double interval = toSeconds((last - 1)->to - first->from) / count;
+  const double sigma = kStep_s * std::sqrt(2.0 * std::max(*best, 1e-4) / (3.0 * count * bend));
   return PartOffset{first->from, (last - 1)->to, camera.time_offset_s + kStep_s * (step + vertex),
-                    kStep_s * std::sqrt(2.0 * std::max(*best, 1e-4) / (3.0 * count * bend))};
+                    std::hypot(sigma, kOfInterval * interval)};
 }
 
 TimePoint timeOf(const PartOffset& part) { return part.from + (part.to - part.from) / 2; }
@@ -163,14 +167,19 @@ StampStep stepIn(const Stamps& stamps, TimePoint from, TimePoint to, double chan
 replay::DataFindings stepFinding(const Parts& parts, const Course& step,
                                  const replay::Recording& recording) {
   const PartOffset &before = parts[step.split - 1], &after = parts[step.split];
-  const double near_s = std::max(0.02, 0.25 * std::abs(step.change));
+  const double near_s =
+      std::min(std::max(0.02, 0.25 * std::abs(step.change)), 0.5 * std::abs(step.change));
   const Duration beside = std::chrono::milliseconds(500);
   const StampStep imu = stepIn(Stamps(recording.imu), before.from - beside, after.to + beside,
                                step.change),
                   images = stepIn(Stamps(framesOf(recording)), before.from, after.to, -step.change);
   const StampStep& found = imu.off_s <= images.off_s ? imu : images;
   const bool seen = found.off_s < near_s;
-  if (!seen && (step.split < 2 || step.split + 2 > parts.size())) return {};  // one part may be off
+  // Without a stamp that jumps, one part may be off, and long intervals blur the offsets.
+  const double usual_s = Stamps(framesOf(recording)).usual;
+  if (!seen &&
+      (step.split < 2 || step.split + 2 > parts.size() || std::abs(step.change) < usual_s / 3.0))
+    return {};
   const std::string of_camera = recording.calibration.cameras.front().name;
   const std::string place =
       seen ? fmt::format("at {} ns the stamps of {} jump {} by {:.3f} s", toNanoseconds(found.time),
@@ -224,11 +233,15 @@ bool offsetsDiffer(Parts parts, const CameraCalibration& camera) {
 
 bool hasStampStep(const replay::Recording& recording) {
   constexpr double kOfImu = 2.0, kOfImages = 0.6;
+  // Intervals of whole multiples are due to lost data.
   const auto isIrregular = [](const Stamps& stamps, double share) {
-    constexpr double kLeast_s = 0.04;
+    constexpr double kLeast_s = 0.04, kWhole = 0.15;
     const double off = std::max(kLeast_s, share * stamps.usual);
-    return std::ranges::any_of(stamps.intervals,
-                               [&](double one) { return std::abs(one - stamps.usual) > off; });
+    return std::ranges::any_of(stamps.intervals, [&](double one) {
+      const double times = one / stamps.usual;
+      return std::abs(one - stamps.usual) > off &&
+             (times < 1.5 || std::abs(times - std::round(times)) > kWhole);
+    });
   };
   return isIrregular(Stamps(recording.imu), kOfImu) ||
          isIrregular(Stamps(framesOf(recording)), kOfImages);
@@ -244,7 +257,8 @@ replay::DataFindings judgeParts(Parts parts, const replay::Recording& recording)
   const auto count = static_cast<double>(parts.size());
   const double enough = std::min(kOrdinary * count, kBetter * deviationsOf(parts, constant));
   const double lasts = toSeconds(timeOf(parts.back()) - timeOf(parts.front()));
-  if (line.worst <= step.worst && line.worst < enough && std::abs(line.change) * lasts > kLeast_s)
+  const double least = std::max(kLeast_s, Stamps(framesOf(recording)).usual / 3.0);
+  if (line.worst <= step.worst && line.worst < enough && std::abs(line.change) * lasts > least)
     return rateFinding(line.change, recording.calibration.cameras.front());
   if (step.worst < enough && std::abs(step.change) > kLeast_s)
     return stepFinding(parts, step, recording);

@@ -8,6 +8,7 @@
 #include <future>
 #include <opencv2/core.hpp>
 
+#include "common/base/algorithms/median.h"
 #include "common/camera/camera_model.h"
 #include "common/math/so3.h"
 #include "tools/data_check/image_turn.h"
@@ -170,18 +171,23 @@ replay::DataFindings judgeThousandths(const TurnPairs& pairs, double pair_s,
                                       const std::vector<ImuSample>& samples,
                                       const CameraCalibration& camera) {
   constexpr double kLeast = 5e3, kLeast_px = 0.3, kNoBody = 100.0;  // rad/s
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  double squares = 0.0;
-  for (const auto& sample : samples) sum += sample.gyro, squares += sample.gyro.squaredNorm();
-  const auto count = static_cast<double>(samples.size());
-  const double rate = std::sqrt(std::max(0.0, squares - sum.squaredNorm() / count) / count);
+  Eigen::Vector3d middle;  // medians, because some samples may be spikes
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    std::vector<double> values;
+    for (const auto& sample : samples) values.push_back(sample.gyro[i]);
+    middle[i] = medianOf(std::move(values));
+  }
+  std::vector<double> deviations;
+  for (const auto& sample : samples) deviations.push_back((sample.gyro - middle).norm());
+  const double rate = medianOf(std::move(deviations));
   const bool seen = pairs.turning() * camera.fx > kLeast_px;
   if (rate < kNoBody && !(seen && rate * pair_s > kLeast * pairs.turning())) return {};
-  return {{DataFinding::Grade::kFatal, "gyro_scale",
-           fmt::format("the gyroscope's rates vary by {:.3g} (RMS), far more than the images show: "
-                       "they are in thousandths of a degree per second (then multiply its columns "
-                       "by 1.74533e-5), or the sensor's counts (by the scale of its data sheet)",
-                       rate)}};
+  return {
+      {DataFinding::Grade::kFatal, "gyro_scale",
+       fmt::format("the gyroscope's rates vary by {:.3g} (median), far more than the images show: "
+                   "they are in thousandths of a degree per second (then multiply its columns "
+                   "by 1.74533e-5), or the sensor's counts (by the scale of its data sheet)",
+                   rate)}};
 }
 
 /// Judges the unit: rates that are far larger or smaller than the image rotation.
@@ -243,8 +249,18 @@ std::optional<double> betterOffset(const std::vector<Turn>& turns, const TurnInt
   return inside ? offset : std::nullopt;
 }
 
+/// The pairs whose rotation is exactly known: corners are lost in long ones.
+std::vector<Turn> shortTurns(std::vector<Turn> turns) {
+  constexpr double kLongest_s = 0.15, kLargest = 0.15;  // s, rad
+  std::erase_if(turns, [](const Turn& turn) {
+    return toSeconds(turn.to - turn.from) > kLongest_s || turn.of_images.norm() > kLargest;
+  });
+  return turns;
+}
+
 /// Judges rates that are some percent too large or too small but agree with the images otherwise.
 replay::DataFindings judgeFactor(const TurnPairs& pairs, const CameraCalibration& camera) {
+  if (pairs.count() < kLeastTurns) return {};
   constexpr double kLeast = 0.04, kSurely = 3.0, kAgreed = 0.05;
   const Eigen::Matrix3Xd said = camera.T_BC.R().transpose() * pairs.given;
   const double all = std::max(1e-18, said.squaredNorm());
@@ -347,7 +363,8 @@ replay::DataFindings judgeTurns(const std::vector<Turn>& turns,
   if (!findings.empty()) return findings;
   if (std::min(pairs.turningOfGiven(), pairs.turning()) * camera.fx < kEnough_px) return {};
   auto place = judgePlace(turns, gyro, pairs, camera);
-  return place.empty() ? judgeFactor(pairs, camera) : place;
+  if (!place.empty()) return place;
+  return judgeFactor(pairsOf(shortTurns(turns), gyro, camera.time_offset_s), camera);
 }
 
 std::optional<double> offsetOfTurns(const std::vector<Turn>& turns,

@@ -58,7 +58,6 @@ Doubts doubtsOfFindings(const replay::DataFindings& findings) {
       {"images_repeated", "images are repeated"},
       {"lines_lost", "lines of the recording were not used"},
       {"boxes_beyond", "boxes of other frames were not used"},
-      {"boxes_of_part", "boxes may have wrong frame numbers"},
       {"boxes_outside", "boxes do not fit the size of the images"},
       {"classes_unknown", "classes of boxes are not known"},
       {"imu_repeats", "the IMU repeats one sample"},

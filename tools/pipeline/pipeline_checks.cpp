@@ -206,9 +206,12 @@ void Pipeline::checkClasses(const semantic_filter::ClassPriors& priors) {
   std::vector<std::string> known;
   for (const auto& prior : priors.classes) known.push_back(prior.name);
   std::string names;
+  constexpr std::size_t kFew = 10;  // of a tenth of the boxes nothing need be said
   for (const auto& [name, rows] : detection_file_->classCounts()) {
     if (std::ranges::find(known, name) != known.end() || name == priors.other.name) continue;
     const std::string near = nearestWord(name, known);
+    if (near.empty() && !replay::parseNumber(name) && kFew * rows < detection_file_->rows())
+      continue;
     names += fmt::format("{}{} ({} boxes{})", names.empty() ? "" : ", ", name, rows,
                          replay::parseNumber(name) ? ", a number: write the name"
                          : near.empty()            ? std::string()
@@ -217,9 +220,8 @@ void Pipeline::checkClasses(const semantic_filter::ClassPriors& priors) {
   if (names.empty()) return;
   findings_.push_back(
       {replay::DataFinding::Grade::kWarning, "classes_unknown",
-       fmt::format("{}: no size is known of the class {}; known are {}; add others to {}",
-                   options_.detections, names, fmt::join(known, ", "),
-                   configs_.semantic_filter.class_priors)});
+       fmt::format("{}: no size is known of the class {}; {} lists those that are known; add it",
+                   options_.detections, names, configs_.semantic_filter.class_priors)});
 }
 
 void Pipeline::refuseUnwritten() const {

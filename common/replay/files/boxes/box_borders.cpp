@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "common/base/errors.h"
 #include "common/replay/files/boxes/detection_file.h"
@@ -79,13 +80,14 @@ std::string DetectionFile::exchanged(double right, double bottom) const {
 std::string DetectionFile::whyCut(double right, double bottom) const {
   constexpr double kSame_px = 0.5, kOther = 0.02;
   constexpr std::size_t kLeast = 5;
-  std::size_t at_right = 0, at_bottom = 0;
+  std::set<double> lefts, tops;  // different boxes
   for (const auto& [frame, rows] : rows_) {
     for (const Row& row : rows) {
-      at_right += row.detection.box.x2 > right - kSame_px ? 1 : 0;
-      at_bottom += row.detection.box.y2 > bottom - kSame_px ? 1 : 0;
+      if (row.detection.box.x2 > right - kSame_px) lefts.insert(row.detection.box.x1);
+      if (row.detection.box.y2 > bottom - kSame_px) tops.insert(row.detection.box.y1);
     }
   }
+  const std::size_t at_right = lefts.size(), at_bottom = tops.size();
   const double x = (right + 1.0) / options_.width, y = (bottom + 1.0) / options_.height;
   const bool wide = at_right >= kLeast && x > 1.0 + kOther;
   const bool high = at_bottom >= kLeast && y > 1.0 + kOther;
@@ -94,7 +96,7 @@ std::string DetectionFile::whyCut(double right, double bottom) const {
   if (!wide && !high && !smaller) return {};
   return fmt::format(
       "{} boxes end at x = {:.0f} and {} at y = {:.0f}: these are the borders of other images than "
-      "those of {}x{}; scale the boxes, and subtract the margin of padded images",
+      "those of {}x{}; scale or shift the boxes back",
       at_right, right, at_bottom, bottom, options_.width, options_.height);
 }
 

@@ -186,12 +186,15 @@ bool isHeaderless(const std::vector<TextLine>& lines, const DetectionFileOptions
   return true;
 }
 
-/// Returns the number of a frame that is given by its number or by the name of its image.
-std::optional<std::int64_t> frameOf(std::string_view field,
+/// Returns the number of a frame that is given by its number, which begins at `first`, or by the
+/// name of its image. Names that are possible numbers count as numbers.
+std::optional<std::int64_t> frameOf(std::string_view field, int first,
                                     const std::map<std::string, std::uint64_t>& numbers) {
+  const auto number = parseInteger(field);
+  if (number && *number - first < static_cast<std::int64_t>(numbers.size())) return *number - first;
   const auto named = numbers.find(std::filesystem::path(field).stem().string());
   if (named != numbers.end()) return static_cast<std::int64_t>(named->second);
-  return parseInteger(field);
+  return number ? std::optional(*number - first) : std::nullopt;
 }
 
 using NumberedRow = std::pair<std::uint64_t, DetectionFile::Row>;
@@ -205,8 +208,7 @@ Result<NumberedRow> readRow(const std::string& text, const Columns& columns,
                     " are expected (frame,x1,y1,x2,y2,score without a header; MOT's lines have 7 "
                     "to 10)");
   }
-  auto frame = frameOf(fields[columns.frame], options.numbers);
-  if (frame && columns.mot) --*frame;
+  const auto frame = frameOf(fields[columns.frame], columns.mot ? 1 : 0, options.numbers);
   if (!frame || *frame < 0) {
     return fail("detection_malformed", "frame is a whole number from {}", columns.mot ? 1 : 0);
   }
