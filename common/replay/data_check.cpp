@@ -182,9 +182,9 @@ AtMost atMost(const std::vector<ImuSample>& samples, Eigen::Index axis) {
 /// Adds imu_saturated if an axis stays at its largest value, which it should only touch, while the
 /// others change.
 void checkSaturated(const std::vector<ImuSample>& samples, DataFindings& findings) {
-  constexpr std::size_t kFewestAtMost = 10, kShare = 200, kFewestTimes = 3;
+  constexpr std::size_t kFewestAtMost = 10, kShare = 200, kFewestTimes = 2;
   constexpr double kLeast_rad_s = 0.1, kLeast_m_s2 = 2.0;
-  constexpr double kResolution = 20.0;  // largest value, in steps of the sensor
+  constexpr double kResolution = 100.0;  // largest value, in steps of the sensor
   for (Eigen::Index axis = 0; axis < 6; ++axis) {
     const AtMost at = atMost(samples, axis);
     const bool few = at.samples < kFewestAtMost || kShare * at.samples < samples.size(),

@@ -29,7 +29,8 @@ std::string rowsTo(int right, int bottom) {
   std::string text = kPlain;
   for (int k = 0; k < 40; ++k) {
     const bool end = k % 4 == 0;
-    text += "0,car,3," + std::to_string(k % 7) + "," +
+    const std::string corner = std::to_string(k);
+    text += "0,car," + corner + "," + corner + "," +
             std::to_string(end ? right : right / 2 + k % 9) + "," +
             std::to_string(end ? bottom : bottom / 2 + k % 9) + ",.9\n";
   }
