@@ -232,7 +232,10 @@ void checkArrival(const std::vector<TimePoint>& images, DataFindings& findings) 
   const auto whole = std::ranges::count_if(intervals, [&](double one) {
     return std::abs(one / least_s - std::round(one / least_s)) < kWhole;
   });
-  if (static_cast<double>(whole) > kMostWhole * static_cast<double>(intervals.size())) return;
+  const bool dropped =
+      least_s > kShare * usual &&
+      static_cast<double>(whole) > kMostWhole * static_cast<double>(intervals.size());
+  if (dropped) return;
   const double latency = latencyIn(intervals, usual);
   const auto irregular = std::ranges::count_if(
       intervals, [&](double one) { return one < kLow * usual || one > kHigh * usual; });

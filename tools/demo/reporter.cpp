@@ -213,7 +213,8 @@ void LatencyMeter::onObjects(const Objects& objects, std::int64_t now_ns) {
 void LatencyMeter::onDetections(const Detections& detections) {
   if (!(detections.forward_s > 0.0)) return;
   Frame& frame = frames_[detections.stamp.sequence];
-  if (frame.forward_ms < 0.0) frame.forward_ms = 1e3 * detections.forward_s;
+  // Objects that came earlier are those of a prediction without these detections.
+  if (frame.forward_ms < 0.0 && frame.age_ms < 0.0) frame.forward_ms = 1e3 * detections.forward_s;
 }
 
 nlohmann::ordered_json LatencyMeter::report() const {

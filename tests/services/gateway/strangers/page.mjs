@@ -231,6 +231,7 @@ check(again.dark < 60 && again.light > 60 && again.times === 2, `an image is dra
 // disappear.
 const poles = await page.evaluate(() => {
   const { model, world } = window.perdure, shown = model.world;
+  world.marks.clear(); // that of the loop may be there already
   world.addMark([1, 2, 0], '#ffffff', 'ab/1');
   const before = world.marks.children.filter((m) => m.visible).length;
   const kept = ['ab/1', shown].map((name) => {
