@@ -15,7 +15,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr int kDrives = 2;
+constexpr int kDrives = 3;
 
 CameraModel lensOf(DistortionModel model, std::vector<double> coefficients) {
   CameraCalibration camera = test::testCamera(0);
