@@ -187,7 +187,7 @@ await page.keyboard.press('c');
 // exp(2) : 1 for the first car, and no box for the second; the third is hidden.
 await page.keyboard.press('b');
 const shown = await page.evaluate(() => window.perdure.camera.drawn);
-await page.waitForFunction((n) => window.perdure.camera.annotations?.message.texts.some((t) => /said|\d\.\d\d/.test(t.text)) && window.perdure.camera.drawn > n + 2, { timeout: 20000, polling: 50 }, shown).catch(() => {});
+await page.waitForFunction((n) => window.perdure.camera.annotations?.message.texts.some((t) => /^car 1 \d/.test(t.text)) && window.perdure.camera.drawn > n + 2, { timeout: 20000, polling: 50 }, shown).catch(() => {});
 const likelihood = await page.evaluate(() => {
   const { canvas, annotations } = window.perdure.camera, pen = canvas.getContext('2d');
   const { points, texts } = annotations.message;
