@@ -277,6 +277,10 @@ RigCheck checkRig(replay::Dataset& drive, const RigCheckOptions& options) {
                            " has no inertial samples, by which alone a rig can "
                            "be judged; record imu along with the images");
   }
+  if (drive.calibration().cameras.empty()) {
+    throw StartupError(ExitCode::kUnavailable,
+                       options.data.string() + " has no camera; record with --images");
+  }
   drive.seek(0);
   Watched watched(options, drive);
   watched.run(drive, options);

@@ -226,10 +226,12 @@ std::optional<Fit> fitOf(const Change& change, const std::vector<Chain>& chains,
   const double now = medianOf(changed), before = medianOf(as_given);
   if (changed.size() < kLeast || now > kClearly * before || better < kClearly * tracks)
     return std::nullopt;
+  const std::string of_given = before < kWorst ? fmt::format("of {:.1f} %", 100.0 * before)
+                                               : "of views that no point explains";
   const std::string fix = fmt::format(
       "{} tracks of boxes then move as the poses predict, with deviations of {:.1f} % of their "
-      "size instead of {:.1f} %: {}",
-      changed.size(), 100.0 * now, 100.0 * before, change.doubt.fix);
+      "size instead {}: {}",
+      changed.size(), 100.0 * now, of_given, change.doubt.fix);
   return Fit{now, {change.doubt.what, fix}};
 }
 

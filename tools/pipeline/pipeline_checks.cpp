@@ -52,24 +52,6 @@ std::string fixOfStart(const ReasonCounts& reasons) {
   return "`perdure doctor --data` says more, and the README of vio what the reasons mean";
 }
 
-/// Returns n if the boxes are numbered without gaps up to an n-th of the drive's last frame, as
-/// those of a detector that saw each n-th frame. Otherwise returns 1.
-std::uint64_t framesOfEachBox(const replay::DetectionFile& file, std::uint64_t last) {
-  constexpr std::uint64_t kLeast = 20, kOfFrames = 20;  // tolerates one frame in 20 without a box
-  const std::uint64_t end = file.lastFrame();
-  if (end < kLeast || end > last) return 1;
-  std::uint64_t without = 0;
-  for (std::uint64_t frame = 0; frame <= end; ++frame) {
-    const auto boxes = file.at(frame);
-    without += !boxes || boxes->empty() ? 1 : 0;
-  }
-  if (kOfFrames * without > end) return 1;
-  for (const std::uint64_t n : {2, 3, 4, 5, 10}) {
-    if (n * end <= last && last < n * (end + 1)) return n;
-  }
-  return 1;
-}
-
 /// Adds warnings about boxes that can be used. The drive's frames are `first` to `last`.
 void warnOfBoxes(const replay::DetectionFile& file, const std::string& name, std::uint64_t first,
                  std::uint64_t last, replay::DataFindings& findings) {
@@ -79,12 +61,6 @@ void warnOfBoxes(const replay::DetectionFile& file, const std::string& name, std
   if (!file.note().empty()) warn("boxes_from_one", file.note());
   if (const std::string why = file.whyBeyond(); !why.empty()) {
     warn("boxes_outside", why);
-  }
-  if (const std::uint64_t times = framesOfEachBox(file, last); times > 1) {
-    warn("boxes_of_part",
-         fmt::format("its boxes are of all frames from 0 to {}, those of the drive are 0 … {}: if "
-                     "the detector saw one frame in {}, multiply the numbers by {}",
-                     file.lastFrame(), last, times, times));
   }
   if (const std::size_t beyond = file.rowsBeyond(last); beyond > 0) {
     warn("boxes_beyond", fmt::format("{} of {} boxes are of frames that this drive ({} … {}) does "

@@ -143,7 +143,7 @@ TEST(PipelineRefusal, DetectionsThatCountFromOneAreRefusedAndBoxesBeyondTheDrive
   EXPECT_THAT(pipeline.findings().back().text, HasSubstr("1 of 3 boxes"));
 }
 
-TEST(PipelineRefusal, UnknownClassesAndBoxesOfEachSecondFrameAreSaid) {
+TEST(PipelineRefusal, UnknownClassesAreSaid) {
   const auto root = makeTurningDrive("odd_boxes");
   auto options = optionsFor(root);
   options.detections = (root / "boxes.csv").string();
