@@ -42,6 +42,9 @@ struct Topic {
 template <class T>
 inline const Topic<T> kTopic{std::string(wire::nameOfTopic<T>())};
 
+/// vio's estimates of the cameras; they replace the calibration with the same source.
+inline const Topic<Calibration> kEstimatedCalibration{"calibration/estimated"};
+
 inline Topic<Frame> frameTopic(const std::string& camera) { return {kTopic<Frame>.name + camera}; }
 
 /// Returns whether `row`, a name in the table, is the row of `topic`.

@@ -164,7 +164,7 @@ bool sameCamera(const CameraCalibration& a, const CameraCalibration& b) {
          a.fy == b.fy && a.cx == b.cx && a.cy == b.cy && a.distortion == b.distortion &&
          a.distortion_coefficients == b.distortion_coefficients &&
          a.T_BC.matrix() == b.T_BC.matrix() && a.time_offset_s == b.time_offset_s &&
-         a.readout_s == b.readout_s;
+         a.readout_s == b.readout_s && a.deviations == b.deviations;
 }
 
 }  // namespace perdure

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <iostream>
+#include <optional>
 
 #include "common/base/errors.h"
 #include "common/base/files/access.h"
@@ -268,6 +269,17 @@ void Context::publishHealth() {
   health.reasons = reasons().all();
   if (well_but_silent) health.reasons[kInputSilent] = 1;
   (void)health_writer_.write(health);
+}
+
+void Context::onCalibration(const Sink<Calibration>& use) {
+  const auto refined = std::make_shared<std::optional<InstanceId>>();
+  on(bus::kTopic<Calibration>, [refined, use](const Calibration& m) {
+    if (*refined != m.source) use(m);
+  });
+  on(bus::kEstimatedCalibration, [refined, use](const Calibration& m) {
+    *refined = m.source;
+    use(m);
+  });
 }
 
 int runService(int argc, char** argv, const Program& program) {

@@ -60,6 +60,8 @@ class Context {
     endpoints_.push_back(reader);
     return *reader;
   }
+  /// Reads calibrations, and vio's estimates, which replace those that they refine.
+  void onCalibration(const Sink<Calibration>& use);
   template <class T>
   bus::Writer<T>& writer(const bus::Topic<T>& topic, const bus::WriterOptions& options = {}) {
     auto writer = std::make_shared<bus::Writer<T>>(participant_, topic, options);

@@ -63,6 +63,18 @@ constexpr std::size_t coefficientsOf(DistortionModel model) {
   return model == DistortionModel::kNone ? 0 : model == DistortionModel::kRational ? 8 : 4;
 }
 
+/// Standard deviations of a calibration; 0: not known.
+struct CameraDeviations {
+  double focal = 0.0;       ///< of both focal lengths, relative
+  double centre_px = 0.0;   ///< of the principal point
+  double distortion = 0.0;  ///< of the first two coefficients
+  double rotation = 0.0;    ///< of T_BC, rad about each axis
+  double position_m = 0.0;  ///< of T_BC, along each axis
+  double time_offset_s = 0.0;
+
+  bool operator==(const CameraDeviations&) const = default;
+};
+
 struct CameraCalibration {
   std::string name;  ///< "cam0"
   std::uint32_t width = 0, height = 0;
@@ -73,6 +85,7 @@ struct CameraCalibration {
   double time_offset_s = 0.0;                   ///< t_imu = t_image + time_offset_s
   double readout_s = 0.0;                       ///< rolling shutter, first to last row; 0 = global
   double rate_hz = 0.0;                         ///< nominal
+  CameraDeviations deviations;
 };
 
 struct ImuCalibration {
@@ -157,6 +170,13 @@ void describe(auto& a, Is<CameraCalibration> auto& d, auto& w) {
   a.number("time_offset_s", d.time_offset_s, w.time_offset_s, kOffset);
   a.number("readout_s", d.readout_s, w.readout_s, kOffset);
   a.number("rate_hz", d.rate_hz, w.rate_hz, kNotNegative);
+  auto& s = d.deviations;
+  a.number("focal_sigma", s.focal, w.focal_sigma, kNotNegative);
+  a.number("centre_sigma_px", s.centre_px, w.centre_sigma_px, kNotNegative);
+  a.number("distortion_sigma", s.distortion, w.distortion_sigma, kNotNegative);
+  a.number("rotation_sigma", s.rotation, w.rotation_sigma, kNotNegative);
+  a.number("position_sigma_m", s.position_m, w.position_sigma_m, kNotNegative);
+  a.number("time_offset_sigma_s", s.time_offset_s, w.time_offset_sigma_s, kNotNegative);
 }
 
 void describe(auto& a, Is<ImuCalibration> auto& d, auto& w) {

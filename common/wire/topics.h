@@ -111,6 +111,8 @@ constexpr std::tuple kRows{
                   kCapture | kRos2Driver,
                   kVio | kInference | kSemanticFilter | kMapStore |
                       kSubscriber),  // for upright images (inference), and place on Earth
+    PERDURE_TOPIC(Calibration, "calibration/estimated", latched(1), kOnChange, kRecorded, kVio,
+                  kSemanticFilter | kSubscriber),  // the source is that of the refined calibration
     // capture reads odometry if pace.mode is "follow"; vio reads it if another program writes it.
     PERDURE_FINAL_TOPIC(Odometry, "odometry", reliable(64), kCameraHz, kRecorded,
                         kVio | kRos2Driver,
@@ -163,7 +165,8 @@ inline constexpr std::size_t kPosition = []<class... Rows>(const std::tuple<Rows
   return static_cast<std::size_t>(std::find(same.begin(), same.end(), true) - same.begin());
 }(table::kRows);
 
-/// Type<T>::Wire: the generated struct; Type<T>::descriptor(): Cyclone's description.
+/// The first row of a message type. Type<T>::Wire: the generated struct; Type<T>::descriptor():
+/// Cyclone's description.
 template <class T>
 struct Type : std::tuple_element_t<kPosition<T>, Topics> {};
 

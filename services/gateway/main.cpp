@@ -53,7 +53,7 @@ std::vector<gateway::Figure> figuresOf(const web::Stats& stats,
 }
 
 void listenAlways(service::Context& context, gateway::Node& node) {
-  context.on(bus::kTopic<Calibration>, [&](const Calibration& m) { node.onCalibration(m); });
+  context.onCalibration([&](const Calibration& m) { node.onCalibration(m); });
   context.on(bus::kTopic<ModelInfo>, [&](const ModelInfo& m) { node.onModel(m); });
   context.on(bus::kTopic<Event>, [&](const Event& m) { node.onEvent(m); });
   context.on(bus::kTopic<Health>, [&](const Health& m) { node.onHealth(m, monotonicNs()); });

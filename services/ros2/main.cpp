@@ -48,8 +48,7 @@ class Outwards {
 
   /// Reads topics that are latched or needed by others; their messages are small and infrequent.
   void listenAlways() {
-    context_.on(bus::kTopic<Calibration>,
-                [this](const Calibration& m) { mirror_.onCalibration(m); });
+    context_.onCalibration([this](const Calibration& m) { mirror_.onCalibration(m); });
     context_.on(bus::kTopic<ModelInfo>, [this](const ModelInfo& m) { mirror_.onModel(m); });
     context_.on(bus::kTopic<MapFrame>, [this](const MapFrame& m) { mirror_.onMapFrame(m); });
     context_.on(bus::kTopic<Health>, [this](const Health& m) { mirror_.onHealth(m); });

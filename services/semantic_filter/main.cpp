@@ -70,7 +70,7 @@ void serve(service::Context& context, const semantic_filter::Config& config) {
   bus::Once odometry_once;  // the node counts repeated detections
   context.countReasons([&]() -> const ReasonCounts& { return node.reasons(); });
   context.countReasons([&]() -> const ReasonCounts& { return lost; });
-  context.on(bus::kTopic<Calibration>, [&](const Calibration& m) { node.onCalibration(m); });
+  context.onCalibration([&](const Calibration& m) { node.onCalibration(m); });
   context.on(bus::kTopic<ModelInfo>, [&](const ModelInfo& m) { node.onModel(m); });
   context.on(bus::kTopic<SwapNotice>, [&](const SwapNotice& m) { node.onSwap(m); });
   context.on(bus::kTopic<MapNear>, [&](const MapNear& m) {

@@ -7,6 +7,22 @@
 namespace perdure::vio {
 namespace {
 
+/// Returns the largest distance, as a share of the width, between the pixels of distant points in
+/// both cameras.
+double largestShift(const CameraModel& before, const CameraModel& now) {
+  const Eigen::Matrix3d R = now.T_BC().R().transpose() * before.T_BC().R();
+  double largest = 0.0;
+  for (const double x : {0.1, 0.5, 0.9}) {
+    for (const double y : {0.1, 0.5, 0.9}) {
+      const Eigen::Vector2d pixel(x * before.width(), y * before.height());
+      const auto ray = before.unproject(pixel);
+      const auto moved = ray ? now.project(R * ray->homogeneous()) : std::nullopt;
+      if (moved) largest = std::max(largest, (*moved - pixel).norm() / before.width());
+    }
+  }
+  return largest;
+}
+
 std::string sizeText(std::uint32_t width, std::uint32_t height) {
   return std::to_string(width) + "×" + std::to_string(height);
 }
@@ -53,6 +69,43 @@ Cameras::Cameras(const Config& config, const Options& options, const std::vector
     : tracker(config.tracker, all),
       estimator(options, extrinsics(all), all[0].calibration().time_offset_s, readouts(all)),
       models(all) {}
+
+void useDeviations(const CameraDeviations& rig, CalibrationOptions& options) {
+  const CalibrationOptions usual;
+  const auto use = [](double given, double otherwise, double& value) {
+    if (given > 0.0 && value == otherwise) value = given;
+  };
+  use(rig.focal, usual.focal, options.focal);
+  use(rig.centre_px, usual.centre_px, options.centre_px);
+  use(rig.distortion, usual.distortion, options.distortion);
+  use(rig.rotation, usual.extrinsic_rotation, options.extrinsic_rotation);
+  use(rig.position_m, usual.extrinsic_position_m, options.extrinsic_position_m);
+  use(rig.time_offset_s, usual.time_offset_s, options.time_offset_s);
+}
+
+void CameraNews::begin(const Calibration& given) {
+  given_ = given;
+  again_ = !published_.empty();
+}
+
+std::optional<Calibration> CameraNews::take(const Estimator& estimator,
+                                            const std::vector<CameraModel>& models) {
+  constexpr double kNoticeable = 0.0025;  // of the width: 0.15 to 0.2° for usual lenses
+  const bool approximate = estimator.options().calibration.estimated().lens;
+  if (published_.empty() && !approximate && !estimator.mountTurn()) return std::nullopt;
+  std::vector<CameraModel> now = estimator.cameras(models);
+  const CameraModel& before = published_.empty() ? models[0] : published_[0];
+  if (!again_ && largestShift(before, now[0]) < kNoticeable) return std::nullopt;
+  again_ = false;
+  Calibration news = given_;
+  for (const CameraModel& model : now) {
+    for (CameraCalibration& camera : news.cameras) {
+      if (camera.name == model.calibration().name) camera = model.calibration();
+    }
+  }
+  published_ = std::move(now);
+  return news;
+}
 
 bool sameCameras(const Calibration& a, const Calibration& b) {
   return std::equal(a.cameras.begin(), a.cameras.end(), b.cameras.begin(), b.cameras.end(),

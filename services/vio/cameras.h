@@ -35,6 +35,25 @@ std::string unknownCamera(const Config& config, const Calibration& calibration);
 std::vector<RigidTransform> extrinsics(const std::vector<CameraModel>& all);
 std::vector<double> readouts(const std::vector<CameraModel>& all);
 
+/// Replaces deviations that have their default values by those of the rig, if known.
+void useDeviations(const CameraDeviations& rig, CalibrationOptions& options);
+
+/// Selects estimates of the cameras for publication. Only cameras whose lens is estimated, or that
+/// turned on the body, are published, and only if pixels move noticeably.
+class CameraNews {
+ public:
+  /// Sets the calibration to which the estimates belong. Published cameras are published again.
+  void begin(const Calibration& given);
+  /// Returns the calibration with the estimated cameras `models`, if it is to be published.
+  std::optional<Calibration> take(const Estimator& estimator,
+                                  const std::vector<CameraModel>& models);
+
+ private:
+  Calibration given_;
+  std::vector<CameraModel> published_;
+  bool again_ = false;
+};
+
 /// Returns true if both calibrations have the same cameras in the same order.
 bool sameCameras(const Calibration& a, const Calibration& b);
 

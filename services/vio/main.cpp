@@ -76,7 +76,8 @@ void estimate(service::Context& context, const vio::Config& config) {
                         odometry(m);
                         context.health().frameOut();
                       },
-                  .landmarks = context.sink(bus::kTopic<Landmarks>)});
+                  .landmarks = context.sink(bus::kTopic<Landmarks>),
+                  .calibration = context.sink(bus::kEstimatedCalibration)});
   ReasonCounts own;
   if (const auto text = file.read()) {
     if (const auto restored = node.restoreState(*text); !restored) {

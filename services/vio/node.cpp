@@ -55,7 +55,7 @@ void Node::onCalibration(const Calibration& calibration) {
   if (calibration.cameras.empty()) return reasons_.add("calibration_without_camera");
   if (calibration_ && sameCameras(*calibration_, calibration)) {
     calibration_->has_speed = calibration.has_speed;
-    return;
+    return news_.begin(calibration);
   }
   if (calibration_) {
     if (started()) lose({"calibration_changed", ""});
@@ -63,8 +63,10 @@ void Node::onCalibration(const Calibration& calibration) {
   }
   agreement_.clear();
   calibration_ = calibration;
+  news_.begin(calibration);
   std::vector<CameraModel> models = usedCameras(config_, calibration);
   Options options = config_.core;
+  useDeviations(models[0].calibration().deviations, options.calibration);
   if (config_.prefer_calibration && calibration.imu && calibration.imu->gyro_noise > 0 &&
       calibration.imu->accel_noise > 0) {
     options.imu.gyro = calibration.imu->gyro_noise;
@@ -226,7 +228,7 @@ void Node::noteGaps(TimePoint now) {
 }
 
 TrackedFrame Node::trackImages(const cv::Mat& first, const cv::Mat& second, TimePoint now) {
-  if (config_.core.calibration.focal > 0.0) {
+  if (cameras_->estimator.options().calibration.estimated().lens) {
     cameras_->tracker.setCameras(cameras_->estimator.cameras(cameras_->models));
   }
   std::optional<Eigen::Matrix3d> R;
@@ -292,6 +294,9 @@ void Node::process(const FramePair& frames) {
   }
   imu_.dropBefore(cameras_->estimator.state().time - std::chrono::seconds(3));
   judgeImages(*estimate);
+  if (const auto cameras = news_.take(cameras_->estimator, cameras_->models)) {
+    if (outputs_.calibration) outputs_.calibration(*cameras);
+  }
   publish(stamp, *estimate);
   publishLandmarks(stamp, *first);
   if (outputs_.innovations) outputs_.innovations(estimate->innovations);
@@ -372,25 +377,6 @@ void Node::publishLandmarks(const FrameStamp& stamp, const cv::Mat& image) {
   outputs_.landmarks(landmarksMessage(stamp, instance_, world_,
                                       cameras_->models[0].calibration().name,
                                       cameras_->estimator.landmarks(), image));
-}
-
-std::string Node::saveState() const {
-  if (!started()) return {};
-  SavedState saved = cameras_->estimator.save();
-  saved.world = world_;
-  saved.next_track = cameras_->tracker.nextId();
-  return toText(saved);
-}
-
-Result<void> Node::restoreState(const std::string& text) {
-  auto saved = fromText(text);
-  if (!saved) return tl::unexpected(saved.error());
-  if (cameras_ && saved->T_BC.size() != cameras_->models.size()) {
-    return fail("state_other_cameras", "the saved state has another number of cameras");
-  }
-  world_ = saved->world;
-  saved_ = std::move(*saved);
-  return {};
 }
 
 }  // namespace perdure::vio

@@ -29,6 +29,8 @@ struct Outputs {
   Sink<Landmarks> landmarks;  ///< sent after the odometry, once the filter has started
   /// Sent after the odometry: innovations of the image, for programs that check a calibration.
   Sink<std::vector<Innovation>> innovations = {};
+  /// Sent before the odometry if estimates of the cameras differ from those sent before.
+  Sink<Calibration> calibration = {};
 };
 
 inline constexpr int kDegradedFrames = 20;  ///< number of degraded frames after a gap or a restart
@@ -86,6 +88,7 @@ class Node {
   WorldId world_;
   std::optional<Calibration> calibration_;
   std::unique_ptr<Cameras> cameras_;
+  CameraNews news_;
   ImuBuffer imu_;
   SpeedHistory speeds_;
   WaitingFrames waiting_;

@@ -92,4 +92,23 @@ void Node::begin(TimePoint now, const FrameInput& input) {
   motion_initialiser_.clear();
 }
 
+std::string Node::saveState() const {
+  if (!started()) return {};
+  SavedState saved = cameras_->estimator.save();
+  saved.world = world_;
+  saved.next_track = cameras_->tracker.nextId();
+  return toText(saved);
+}
+
+Result<void> Node::restoreState(const std::string& text) {
+  auto saved = fromText(text);
+  if (!saved) return tl::unexpected(saved.error());
+  if (cameras_ && saved->T_BC.size() != cameras_->models.size()) {
+    return fail("state_other_cameras", "the saved state has another number of cameras");
+  }
+  world_ = saved->world;
+  saved_ = std::move(*saved);
+  return {};
+}
+
 }  // namespace perdure::vio

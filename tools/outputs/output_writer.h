@@ -36,6 +36,7 @@ class OutputWriter {
   void onObjects(const Objects& objects);
   void onEvent(const Event& event);
   void onDetections(const Detections& detections) { log_.add(detections); }
+  void onEstimatedCamera(const CameraCalibration& camera) { log_.add(camera); }
   /// Stores the points for map.png whose standard deviation is at most 1 m.
   void onLandmarks(const Landmarks& landmarks);
   /// Sets the ground truth for the pictures, in W. Must be called before finish().

@@ -154,7 +154,7 @@ std::optional<StartupError> runInto(const PipelineOptions& options, const std::s
   return std::nullopt;
 }
 
-/// Implements `--rig auto`: finds the rig, writes it to OUT/rig.yaml, and lets vio refine it.
+/// Implements `--rig auto`: finds the rig and writes it to OUT/rig.yaml.
 void findRig(PipelineOptions& options) {
   constexpr double kFirst_s = 60.0;
   const std::string file = options.out + "/rig.yaml";
@@ -166,10 +166,6 @@ void findRig(PipelineOptions& options) {
   for (const auto& line : calibrate::linesOf(found)) {
     std::fprintf(stderr, "rig: %s\n", line.c_str());
   }
-  // Before the user's own, which replace them.
-  std::vector<std::string> deviations = calibrate::vioDeviations(found);
-  for (std::string& line : deviations) line.insert(0, "vio.");
-  options.assignments.insert(options.assignments.begin(), deviations.begin(), deviations.end());
   options.rig = file;
 }
 

@@ -2,6 +2,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "common/base/errors.h"
+#include "common/bus/topics.h"
 #include "common/replay/files/class_aliases.h"
 #include "common/replay/files/output_place.h"
 #include "common/replay/recordings/ros_topics.h"
@@ -209,6 +210,11 @@ void Pipeline::openOdometry(const PipelineOptions& options) {
   };
   sinks.innovations = [this](const std::vector<vio::Innovation>& all) {
     rig_watch_->onInnovations(all);
+  };
+  sinks.calibration = [this](const Calibration& estimated) {
+    keep(bus::kEstimatedCalibration.name, estimated, TimePoint());
+    filter_->onCalibration(estimated);
+    outputs_->onEstimatedCamera(estimated.cameras.front());
   };
   constexpr double kWatched_s = 60.0;  // checks the rig in the first 60 s, like perdure doctor
   rig_watch_.emplace(dataset_->calibration().cameras.front(), kWatched_s);

@@ -1,6 +1,7 @@
 // Runs the filter on recorded odometry and detections. The filter receives the messages that
 // `perdure play` sends to the service, in the same order.
 #include "common/base/errors.h"
+#include "common/bus/topics.h"
 #include "tools/pipeline/pipeline.h"
 
 namespace perdure::tools {
@@ -11,7 +12,7 @@ constexpr char kRecorded[] = "recorded";
 /// Whether a topic is an input of semantic_filter. The recorded answers of the map store are not
 /// used, because the run's own map answers.
 bool isFiltersInput(const std::string& topic) {
-  return topic == "calibration" || topic == "model" || topic == "inference/swap" ||
+  return topic.starts_with("calibration") || topic == "model" || topic == "inference/swap" ||
          topic == "odometry" || topic == "landmarks" || topic == "detections";
 }
 
@@ -73,8 +74,12 @@ void Pipeline::handleRecorded(const replay::RecordedMessage& message) {
     use(*value);
   };
   const auto filter = [&](auto work) { timer_.timeTowardsNext("semantic_filter", work); };
-  if (message.topic == "calibration") {
-    give(Calibration(), [&](const auto& m) { filter([&] { filter_->onCalibration(m); }); });
+  if (message.topic.starts_with("calibration")) {
+    give(Calibration(), [&](const Calibration& m) {
+      filter([&] { filter_->onCalibration(m); });
+      const bool estimated = message.topic == bus::kEstimatedCalibration.name;
+      if (estimated && !m.cameras.empty()) outputs_->onEstimatedCamera(m.cameras.front());
+    });
   } else if (message.topic == "model") {
     give(ModelInfo(), [&](const auto& m) { filter([&] { hear(m); }); });
   } else if (message.topic == "inference/swap") {

@@ -15,7 +15,7 @@ using namespace std::chrono_literals;
 constexpr double kBack = 3.0;  // s; a seek reads the recording from this time before its target
 
 bool isShown(const std::string& topic) {
-  return topic == "calibration" || topic == "odometry" || topic == "landmarks" ||
+  return topic.starts_with("calibration") || topic == "odometry" || topic == "landmarks" ||
          topic == "detections" || topic == "model" || topic == "objects" || topic == "events" ||
          topic == "map/frame" || topic == "map/reply" || topic == "health" ||
          topic.starts_with("frame/");
@@ -181,7 +181,8 @@ void GatewayReplay::seek(std::uint64_t log_ns) {
 void GatewayReplay::recallRig(std::uint64_t log_ns) {
   if (calibration_) node_->onCalibration(*calibration_);
   if (model_) node_->onModel(*model_);
-  recording_.rewind([](const std::string& t) { return t == "calibration" || t == "model"; });
+  recording_.rewind(
+      [](const std::string& t) { return t.starts_with("calibration") || t == "model"; });
   while (const auto message = recording_.next()) {
     if (message->log_ns > log_ns) break;
     feed(*message);
@@ -291,7 +292,7 @@ void GatewayReplay::feed(const replay::RecordedMessage& message) {
     give.operator()<Event>([&](const Event& m) { node_->onEvent(m); });
   } else if (topic == "health") {
     give.operator()<Health>([&](const Health& m) { node_->onHealth(m, nowNs()); });
-  } else if (topic == "calibration") {
+  } else if (topic.starts_with("calibration")) {
     give.operator()<Calibration>(
         [&](const Calibration& m) { calibration_ = m, node_->onCalibration(m); });
   } else if (topic == "model") {

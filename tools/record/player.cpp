@@ -20,7 +20,8 @@ const std::map<std::string, std::set<std::string>> kInputs{
     {"vio", {"calibration", "imu", "speed", "frame/"}},
     {"inference", {"calibration", "frame/", "predictions"}},
     {"semantic_filter",
-     {"calibration", "odometry", "landmarks", "detections", "model", "inference/swap"}},
+     {"calibration", "calibration/estimated", "odometry", "landmarks", "detections", "model",
+      "inference/swap"}},
     {"map_store", {"odometry", "landmarks", "objects", "events"}}};
 
 bool isHeardBy(const std::string& service, const std::string& topic) {

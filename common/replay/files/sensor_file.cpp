@@ -157,8 +157,10 @@ RigidTransform SensorFile::T_IB() const {
 }
 
 void SensorFile::wrong(const std::string& key, const std::string& what) const {
-  throw StartupError(ExitCode::kData,
-                     name_ + ": " + key + " " + what + "; compare it with a sensor.yaml of EuRoC");
+  const YAML::Node node = root_.IsMap() ? root_[key] : YAML::Node();
+  const int line = node ? node.Mark().line + 1 : 0;
+  throw StartupError(ExitCode::kData, "{}: {} {}{}; compare it with a sensor.yaml of EuRoC", name_,
+                     key, what, line > 0 ? fmt::format(" (line {})", line) : "");
 }
 
 void SensorFile::noteUnknownKeys(std::vector<std::string>& notes,
@@ -201,10 +203,12 @@ std::string cameraKeys(const CameraCalibration& camera) {
     text += fmt::format("distortion_coefficients: [{}]\n",
                         fmt::join(camera.distortion_coefficients, ", "));
   }
-  return text + fmt::format(
-                    "time_offset_s: {}  # t_imu = t_image + this\n"
-                    "readout_s: {}  # first to last row; the stamp is the middle row's\n",
-                    camera.time_offset_s, camera.readout_s);
+  return text +
+         fmt::format(
+             "time_offset_s: {}  # t_imu = t_image + this\n"
+             "readout_s: {}  # first to last row; the stamp is the middle row's\n",
+             camera.time_offset_s, camera.readout_s) +
+         deviationKeys(camera.deviations);
 }
 
 std::string imuKeys(const ImuCalibration& imu) {

@@ -71,6 +71,7 @@ class SensorFile {
 /// radial-tangential, radtan, plumb_bob (4 coefficients, 5 with k3, 8 rational); equidistant, equi,
 /// fisheye, kannala_brandt. Kalibr's omni, eucm and ds are approximated by the nearest equidistant
 /// lens (common/camera/wide_lens.h). Time offset, readout and rate are 0 if they are missing.
+/// Deviations (deviationKeys) are optional.
 CameraCalibration readCamera(const SensorFile& file, const std::string& name,
                              const std::optional<RigidTransform>& T_BC_given = {});
 /// Returns T_BC of the second camera in Kalibr's chain from T_cn_cnm1, the transform from the
@@ -82,6 +83,8 @@ ImuCalibration readImuCalibration(const SensorFile& file);
 /// YAML text with the keys of readCamera() or readImuCalibration() except T_BS: one key per line,
 /// with all digits.
 std::string cameraKeys(const CameraCalibration& camera);
+/// The lines of the known deviations.
+std::string deviationKeys(const CameraDeviations& deviations);
 std::string imuKeys(const ImuCalibration& imu);
 std::string transformKey(const RigidTransform& T_BS);
 /// A complete sensor.yaml. The body frame is the IMU frame.

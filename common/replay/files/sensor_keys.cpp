@@ -1,4 +1,6 @@
 // Reads cameras and inertial units from the keys of EuRoC, Kalibr and ROS.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -131,7 +133,40 @@ RigidTransform placeOf(const SensorFile& file, const std::optional<RigidTransfor
       "T_BS (camera in the IMU's frame, 4x4, row by row), or let perdure calibrate find it");
 }
 
+struct DeviationKey {
+  const char* key;
+  double CameraDeviations::*value;
+  double most;
+};
+constexpr DeviationKey kDeviations[] = {
+    {"focal_sigma", &CameraDeviations::focal, 0.3},
+    {"centre_sigma_px", &CameraDeviations::centre_px, 1000.0},
+    {"distortion_sigma", &CameraDeviations::distortion, 1.0},
+    {"rotation_sigma", &CameraDeviations::rotation, 0.5},
+    {"position_sigma_m", &CameraDeviations::position_m, 10.0},
+    {"time_offset_sigma_s", &CameraDeviations::time_offset_s, 0.2}};
+
+CameraDeviations deviationsOf(const SensorFile& file) {
+  CameraDeviations deviations;
+  for (const DeviationKey& one : kDeviations) {
+    if (!file.has(one.key)) continue;
+    const double value = file.number(one.key, 1e-12);
+    if (value > one.most) file.wrong(one.key, fmt::format("is more than {}", one.most));
+    deviations.*one.value = value;
+  }
+  return deviations;
+}
+
 }  // namespace
+
+std::string deviationKeys(const CameraDeviations& deviations) {
+  std::string text;
+  for (const DeviationKey& one : kDeviations) {
+    const double value = deviations.*one.value;
+    if (value > 0.0) text += fmt::format("{}: {}\n", one.key, value);
+  }
+  return text;
+}
 
 CameraCalibration readCamera(const SensorFile& file, const std::string& name,
                              const std::optional<RigidTransform>& T_BC_given) {
@@ -144,6 +179,7 @@ CameraCalibration readCamera(const SensorFile& file, const std::string& name,
   camera.time_offset_s = file.has("time_offset_s") ? file.number("time_offset_s", -1.0)
                                                    : file.number("timeshift_cam_imu", -1.0, 0.0);
   camera.readout_s = readoutOf(file, camera.height);
+  camera.deviations = deviationsOf(file);
   return camera;
 }
 

@@ -25,7 +25,9 @@ std::vector<fs::path> plainFilesIn(const fs::path& path) {
 }
 
 /// Returns true for topics that a recorder repeats at the start of each segment.
-bool isLatchedAlone(const std::string& topic) { return topic == "calibration" || topic == "model"; }
+bool isLatchedAlone(const std::string& topic) {
+  return topic.starts_with("calibration") || topic == "model";
+}
 
 std::uint64_t startOf(const mcap::Reader& file) {
   std::uint64_t start = UINT64_MAX;

@@ -49,17 +49,6 @@ Eigen::Vector3d Estimator::turnOfReadout(const ImuBuffer& imu, TimePoint time) {
   return readout_s * rowMotion(nav, imu, time, half, options_.gravity, readings_, scale).rate;
 }
 
-std::vector<CameraModel> Estimator::cameras(const std::vector<CameraModel>& calibrated) const {
-  if (!state_) return calibrated;
-  std::vector<CameraModel> result;
-  for (std::size_t c = 0; c < calibrated.size(); ++c) {
-    CameraCalibration camera = calibrated[c].calibration();
-    camera.T_BC = state_->T_BC[c];
-    result.push_back(withLens(CameraModel(camera), state_->lens[c]));
-  }
-  return result;
-}
-
 /// Computes the row motion of the newest clone. It is repeated after the update.
 void Estimator::measureRows(const ImuBuffer& imu) {
   const double readout_s = state_->longestReadout();

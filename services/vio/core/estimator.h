@@ -92,12 +92,12 @@ class Estimator {
   /// for a global shutter.
   Eigen::Vector3d turnOfReadout(const ImuBuffer& imu, TimePoint time);
 
-  /// Returns the cameras of `calibrated` with the estimated pose on the body and the estimated
-  /// lens. Before a start they are as calibrated.
+  /// Returns the cameras of `calibrated` with all estimates: lens, pose on the body, time offset,
+  /// read-out. Before a start they are as calibrated.
   std::vector<CameraModel> cameras(const std::vector<CameraModel>& calibrated) const;
 
-  /// Returns the angle, in rad, by which the cameras last turned on the body; nothing if no turn was
-  /// found. Later starts use the cameras' new pose.
+  /// Returns the angle, in rad, by which the cameras last turned on the body; nothing if no turn
+  /// was found. Later starts use the cameras' new pose.
   std::optional<double> mountTurn() const { return mount_.turn(); }
 
   /// Returns the points of the newest image whose position is known, without descriptors.

@@ -1,4 +1,4 @@
-// Initialisation of the state, from a start or from a saved state.
+// Initialisation of the state, from a start or from a saved state; its cameras.
 #include "common/base/check.h"
 #include "services/vio/core/estimator.h"
 
@@ -86,6 +86,19 @@ SavedState Estimator::save() const {
   const int n = state_->calibrationEnd();
   s.covariance = state_->P().topLeftCorner(n, n);
   return s;
+}
+
+std::vector<CameraModel> Estimator::cameras(const std::vector<CameraModel>& calibrated) const {
+  if (!state_) return calibrated;
+  std::vector<CameraModel> result;
+  for (std::size_t c = 0; c < calibrated.size(); ++c) {
+    CameraCalibration camera = calibrated[c].calibration();
+    camera.T_BC = state_->T_BC[c];
+    camera.time_offset_s = state_->time_offset_s;
+    camera.readout_s = state_->readout_s[c];
+    result.push_back(withLens(CameraModel(camera), state_->lens[c]));
+  }
+  return result;
 }
 
 }  // namespace perdure::vio

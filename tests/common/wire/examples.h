@@ -69,19 +69,21 @@ class Examples {
   }
   void fill(SpeedSample& m) { m = {bits(), bits(), time(), uniform(), uniform(0.1, 1)}; }
   CameraCalibration camera() {
-    CameraCalibration c{word(),
-                        1 + below(2000),
-                        1 + below(2000),
-                        uniform(1, 900),
-                        uniform(1, 900),
-                        uniform(),
-                        uniform(),
-                        DistortionModel::kEquidistant,
-                        {},
-                        pose(),
-                        uniform(),
-                        uniform(),
-                        uniform(1, 60)};
+    CameraCalibration c{
+        word(),
+        1 + below(2000),
+        1 + below(2000),
+        uniform(1, 900),
+        uniform(1, 900),
+        uniform(),
+        uniform(),
+        DistortionModel::kEquidistant,
+        {},
+        pose(),
+        uniform(),
+        uniform(),
+        uniform(1, 60),
+        {uniform(0, 1), uniform(0, 1), uniform(0, 1), uniform(0, 1), uniform(0, 1), uniform(0, 1)}};
     if (coin()) c.distortion = DistortionModel::kRational;
     while (c.distortion_coefficients.size() < coefficientsOf(c.distortion)) {
       c.distortion_coefficients.push_back(uniform(-1, 1));

@@ -187,6 +187,16 @@ std::vector<Said> saidAt(const std::vector<Pair>& pairs, const std::vector<ImuSa
   return all;
 }
 
+/// Deviations for vio, which refines the rig. Stretches share the error of the lens model, which
+/// their scatter does not show: on EuRoC clips the errors are up to seven reported deviations.
+CameraDeviations deviationsOf(const JointVector& sigma) {
+  const auto of = [&](int first, int count, double least) {
+    return std::max(least, 3.0 * sigma.segment(first, count).maxCoeff());
+  };
+  return {of(kFocal, 1, 0.003), of(kCentre, 2, 2.0), of(kDistortion, 2, 0.005),
+          of(kTurnOf, 3, 0.01), of(kPlace, 3, 0.01), of(kLater, 1, 0.005)};
+}
+
 }  // namespace
 
 Result<MotionRig> rigFromMotion(const replay::Recording& recording, const WindowOptions& options) {
@@ -205,6 +215,7 @@ Result<MotionRig> rigFromMotion(const replay::Recording& recording, const Window
   // A read-out time that does not differ from 0 is that of a global shutter.
   double& readout_s = found.rig.cameras[0].readout_s;
   if (readout_s < 3.0 * found.joint.sigma[kReadout]) readout_s = 0.0;
+  found.rig.cameras[0].deviations = deviationsOf(found.joint.sigma);
   found.rig.imu = recording.calibration.imu;
   found.images = tracks->images;
   found.second_px = guess->second_px;
@@ -242,21 +253,6 @@ std::vector<std::string> linesOf(const MotionRig& found) {
       fmt::format("from              {} stretches of {} images, turning by {:.1f} px about the "
                   "second axis from image to image; residual {:.2f} px",
                   found.joint.windows, found.images, found.second_px, found.joint.residual_px)};
-}
-
-std::vector<std::string> vioDeviations(const MotionRig& found) {
-  // Stretches share the error of the lens model, which their scatter does not show. On EuRoC clips
-  // the errors are up to seven reported deviations.
-  const auto line = [&](const char* key, int first, int count, double least) {
-    const double scatter = found.joint.sigma.segment(first, count).maxCoeff();
-    return fmt::format("calibration.{}={:.5f}", key, std::max(least, 3.0 * scatter));
-  };
-  return {line("focal", kFocal, 1, 0.003),
-          line("centre", kCentre, 2, 2.0),
-          line("distortion", kDistortion, 2, 0.005),
-          line("extrinsic_rotation", kTurnOf, 3, 0.01),
-          line("extrinsic_position", kPlace, 3, 0.01),
-          line("time_offset", kLater, 1, 0.005)};
 }
 
 MotionRig writeMotionRig(const replay::DatasetOptions& drive, const WindowOptions& options,

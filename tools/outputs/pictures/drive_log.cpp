@@ -56,6 +56,7 @@ void DriveLog::add(const Objects& message) {
   FrameGlance& frame = frameOf(message.stamp);
   frame.has_objects = true;
   frame.T_WB = message.T_WB;
+  frame.camera = camera_;
   frame.objects.clear();
   for (const ObjectBelief& object : message.objects) {
     if (!object.classes.empty()) frame.objects.push_back(glanceAt(object));

@@ -3,9 +3,11 @@
 
 #include <array>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
+#include "common/camera/camera_model.h"
 #include "common/types/detections.h"
 #include "common/types/objects.h"
 
@@ -36,8 +38,9 @@ struct DetectionGlance {
 
 struct FrameGlance {
   FrameStamp stamp;
-  bool has_objects = false;  ///< an `objects` message was received for this frame
-  RigidTransform T_WB;       ///< valid if has_objects
+  bool has_objects = false;                   ///< an `objects` message was received for this frame
+  RigidTransform T_WB;                        ///< valid if has_objects
+  std::shared_ptr<const CameraModel> camera;  ///< as estimated by vio; null: as calibrated
   std::vector<ObjectGlance> objects;
   std::vector<DetectionGlance> detections;
 };
@@ -51,12 +54,17 @@ class DriveLog {
  public:
   void add(const Objects& objects);
   void add(const Detections& detections);
+  /// Sets the estimated camera of the following `objects`.
+  void add(const CameraCalibration& camera) {
+    camera_ = std::make_shared<const CameraModel>(camera);
+  }
 
   const std::map<std::uint64_t, FrameGlance>& frames() const { return frames_; }
 
  private:
   FrameGlance& frameOf(const FrameStamp& stamp);
   std::map<std::uint64_t, FrameGlance> frames_;
+  std::shared_ptr<const CameraModel> camera_;
 };
 
 }  // namespace perdure::tools

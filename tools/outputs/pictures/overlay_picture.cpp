@@ -211,13 +211,14 @@ void OverlayPicture::drawImage(const cv::Mat& from, cv::Mat& to) const {
 }
 
 void OverlayPicture::drawObjects(cv::Mat& image, const FrameGlance& frame) const {
-  const RigidTransform T_CW = (frame.T_WB * camera_.T_BC()).inverse();
+  const CameraModel& camera = frame.camera ? *frame.camera : camera_;
+  const RigidTransform T_CW = (frame.T_WB * camera.T_BC()).inverse();
   const auto objects = fartherFirst(frame);
   std::vector<cv::Rect> boxes(objects.size()), taken;
   for (const bool hidden : {false, true}) {  // draws occluded objects last
     for (std::size_t i = 0; i < objects.size(); ++i) {
       if (objects[i].hidden() != hidden) continue;
-      boxes[i] = drawBox(image, objects[i], T_CW, camera_, scale_);
+      boxes[i] = drawBox(image, objects[i], T_CW, camera, scale_);
     }
   }
   for (std::size_t i = objects.size(); i-- > 0;) {  // places labels of near objects first

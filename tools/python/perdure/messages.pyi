@@ -70,6 +70,12 @@ class CameraCalibration(Message):
     time_offset_s: float  # s
     readout_s: float  # s
     rate_hz: float  # Hz, nominal
+    focal_sigma: float  # relative, 0: not known
+    centre_sigma_px: float  # px, 0: not known
+    distortion_sigma: float  # 0: not known
+    rotation_sigma: float  # rad, 0: not known
+    position_sigma_m: float  # m, 0: not known
+    time_offset_sigma_s: float  # s, 0: not known
 
 class ImuCalibration(Message):
     gyro_noise: float  # float

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 
@@ -26,6 +27,7 @@ Calibration someRig() {
   camera.time_offset_s = -0.00812345678912;
   camera.readout_s = 0.0175;
   camera.rate_hz = 20.0;
+  camera.deviations = {0.003, 2.0, 0.005, 0.01, 0.01, 1.0 / 300.0};
   rig.cameras = {camera, camera};
   rig.cameras[1].name = "cam1";
   rig.cameras[1].distortion = DistortionModel::kNone;
@@ -59,6 +61,7 @@ TEST_F(RigFile, IsReadAsItWasWrittenToTheLastDigit) {
     EXPECT_LT(boxMinus(a.T_BC, b.T_BC).norm(), 1e-14);
     EXPECT_EQ(a.time_offset_s, b.time_offset_s);
     EXPECT_EQ(a.readout_s, b.readout_s);
+    EXPECT_EQ(a.deviations, b.deviations);
   }
   EXPECT_EQ(again.imu->accel_bias_walk, rig.imu->accel_bias_walk);
 }
@@ -91,6 +94,29 @@ TEST_F(RigFile, SaysWhatIsWrongAndWhere) {
   EXPECT_THAT(complaint("\xFF\xD8\xFF\xE0 JFIF\n"), testing::HasSubstr("is a JPEG image"));
   EXPECT_THAT(complaint("{\"ppx\": 160, \"coeffs\": []}"),
               testing::AllOf(testing::HasSubstr("librealsense"), testing::HasSubstr("--rig auto")));
+}
+
+TEST_F(RigFile, DeviationsAreOptionalAndWrongOnesAreNamedWithTheirLine) {
+  const std::string text = rigText(someRig(), "");
+  const auto with = [&](const std::string& line) {
+    std::string changed = text;
+    const auto at = changed.find("  focal_sigma");
+    return changed.replace(at, changed.find('\n', at) + 1 - at, line);
+  };
+  const CameraDeviations without = readRig(write(with(""))).cameras[0].deviations;
+  EXPECT_EQ(without.focal, 0.0);
+  EXPECT_EQ(without.centre_px, 2.0);
+  const auto at = text.begin() + static_cast<long>(text.find("focal_sigma"));
+  const std::string line = std::to_string(1 + std::count(text.begin(), at, '\n'));
+  for (const std::string value : {"0", "-0.1", "0.5", "little", "[0.1]", ".nan"}) {
+    try {
+      readRig(write(with("  focal_sigma: " + value + "\n")));
+      ADD_FAILURE() << value;
+    } catch (const StartupError& error) {
+      EXPECT_THAT(error.what(), testing::AllOf(testing::HasSubstr("cam0: focal_sigma"),
+                                               testing::HasSubstr("(line " + line + ")")));
+    }
+  }
 }
 
 TEST_F(RigFile, TakesThePlaceOfADrivesCalibration) {

@@ -5,6 +5,7 @@
 
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
+#include "services/vio/cameras.h"
 #include "services/vio/core/estimator.h"
 #include "services/vio/core/update/visual.h"
 #include "tests/services/vio/simulated_drive.h"
@@ -163,6 +164,17 @@ TEST(SelfCalibration, AWrongRigIsCorrectedAsFarAsItsDeviationsSay) {
 
 TEST(SelfCalibration, ARightRigIsNotMadeWorse) {
   EXPECT_LT(calibrate({}, approximate()).position_rms, 1.3 * ofExactRig().position_rms + 0.02);
+}
+
+TEST(RigDeviations, ReplaceDefaultsAndNotTheUsersValues) {
+  CalibrationOptions options;
+  options.time_offset_s = 0.04;
+  useDeviations({.focal = 0.01, .rotation = 0.02, .time_offset_s = 0.003}, options);
+  EXPECT_EQ(options.focal, 0.01);
+  EXPECT_TRUE(options.estimated().lens);
+  EXPECT_EQ(options.extrinsic_rotation, 0.02);
+  EXPECT_EQ(options.time_offset_s, 0.04);
+  EXPECT_EQ(options.centre_px, CalibrationOptions().centre_px) << "not known";
 }
 
 struct Turned {
