@@ -165,7 +165,7 @@ StampStep stepIn(const Stamps& stamps, TimePoint from, TimePoint to, double chan
 }
 
 replay::DataFindings stepFinding(const Parts& parts, const Course& step,
-                                 const replay::Recording& recording) {
+                                 const replay::Recording& recording, double least_s) {
   const PartOffset &before = parts[step.split - 1], &after = parts[step.split];
   const double near_s =
       std::min(std::max(0.02, 0.25 * std::abs(step.change)), 0.5 * std::abs(step.change));
@@ -176,9 +176,7 @@ replay::DataFindings stepFinding(const Parts& parts, const Course& step,
   const StampStep& found = imu.off_s <= images.off_s ? imu : images;
   const bool seen = found.off_s < near_s;
   // Without a stamp that jumps, one part may be off, and long intervals blur the offsets.
-  const double usual_s = Stamps(framesOf(recording)).usual;
-  if (!seen &&
-      (step.split < 2 || step.split + 2 > parts.size() || std::abs(step.change) < usual_s / 3.0))
+  if (!seen && (step.split < 2 || step.split + 2 > parts.size() || std::abs(step.change) < least_s))
     return {};
   const std::string of_camera = recording.calibration.cameras.front().name;
   const std::string place =
@@ -247,9 +245,10 @@ bool hasStampStep(const replay::Recording& recording) {
          isIrregular(Stamps(framesOf(recording)), kOfImages);
 }
 
-replay::DataFindings judgeParts(Parts parts, const replay::Recording& recording) {
+replay::DataFindings judgeParts(Parts parts, const replay::Recording& recording,
+                                std::optional<double> least_s) {
   constexpr std::size_t kFewest = 4;
-  constexpr double kOrdinary = 1.6, kBetter = 0.5, kLeast_s = 0.015;
+  constexpr double kOrdinary = 1.6, kBetter = 0.55, kLeast_s = 0.015;
   if (parts.size() < kFewest || !offsetsDiffer(parts)) return {};
   std::ranges::sort(parts, {}, &PartOffset::from);
   const Course line = lineOf(parts), step = stepOf(parts);
@@ -257,11 +256,12 @@ replay::DataFindings judgeParts(Parts parts, const replay::Recording& recording)
   const auto count = static_cast<double>(parts.size());
   const double enough = std::min(kOrdinary * count, kBetter * deviationsOf(parts, constant));
   const double lasts = toSeconds(timeOf(parts.back()) - timeOf(parts.front()));
-  const double least = std::max(kLeast_s, Stamps(framesOf(recording)).usual / 3.0);
+  const double least =
+      std::max(kLeast_s, least_s ? *least_s : Stamps(framesOf(recording)).usual / 3.0);
   if (line.worst <= step.worst && line.worst < enough && std::abs(line.change) * lasts > least)
     return rateFinding(line.change, recording.calibration.cameras.front());
   if (step.worst < enough && std::abs(step.change) > kLeast_s)
-    return stepFinding(parts, step, recording);
+    return stepFinding(parts, step, recording, least);
   return {};
 }
 

@@ -2,6 +2,8 @@
 // reveals a clock that was set by less than a second, or that runs slightly too fast.
 #pragma once
 
+#include <optional>
+
 #include "common/replay/data_check.h"
 #include "tools/data_check/motion_check.h"
 
@@ -28,7 +30,10 @@ bool offsetsDiffer(std::vector<PartOffset> parts, const CameraCalibration& camer
 bool hasStampStep(const replay::Recording& recording);
 
 /// Codes: clock_step (one change of the offset, with its place), clock_rate (the offset changes
-/// evenly). Returns nothing unless one of them explains the offsets.
-replay::DataFindings judgeParts(std::vector<PartOffset> parts, const replay::Recording& recording);
+/// evenly). Returns nothing unless one of them explains the offsets. Smaller changes than
+/// `least_s` are not reported, except for steps in the stamps; by default a third of the usual
+/// interval of the images.
+replay::DataFindings judgeParts(std::vector<PartOffset> parts, const replay::Recording& recording,
+                                std::optional<double> least_s = {});
 
 }  // namespace perdure::tools

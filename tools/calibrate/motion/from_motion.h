@@ -42,7 +42,8 @@ Result<MotionRig> rigFromMotion(const replay::Recording& recording, const Window
 /// One line per parameter: value, standard deviation, and whether the motion determines it.
 std::vector<std::string> linesOf(const MotionRig& found);
 
-/// Returns the deviations of the rig as "key=value" lines for vio, which refines such a rig further.
+/// Returns the deviations of the rig as "key=value" lines for vio, which refines such a rig
+/// further.
 std::vector<std::string> vioDeviations(const MotionRig& found);
 
 /// Writes the rig file of a drive. Throws StartupError(kData) with the reason if no rig can be
