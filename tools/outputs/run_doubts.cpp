@@ -21,8 +21,9 @@ constexpr Rule kRules[] = {
     {"frame_without_update", 10, "no image point could be used",
      "their poses are from the IMU alone; check exposure, contrast, size and lens of the images"},
     {"images_contradict_imu", 20, "images contradict the IMU",
-     "T_BS, the IMU's axes, signs or units, the focal length or time_offset_s may be wrong; see "
-     "perdure doctor --data"},
+     "T_BS, the IMU's axes, signs or units, the focal length, time_offset_s or the order of the "
+     "images "
+     "may be wrong; see perdure doctor --data"},
     {"position_uncertain", 20, "the position is uncertain",
      "its standard deviation grew by more than vio.odometry.position_growth in ten seconds: turn "
      "less on the spot, or calibrate the rig (perdure doctor --data)"},
