@@ -5,15 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
+#include <set>
 
 #include "common/base/algorithms/median.h"
 #include "common/base/errors.h"
 #include "common/replay/clock_check.h"
 #include "common/replay/image_check.h"
-#include "common/vision/decode.h"
-#include "common/vision/image.h"
-#include "common/vision/jpeg.h"
 
 namespace perdure::replay {
 namespace {
@@ -181,6 +178,16 @@ double shareOfChanges(const std::vector<ImuSample>& samples, const Run& run, Eig
   return static_cast<double>(changes) / static_cast<double>(run.count());
 }
 
+/// Whether the axis has few different values outside of a run, although it changes there.
+bool isCoarse(const std::vector<ImuSample>& samples, const Run& run, Eigen::Index axis) {
+  constexpr std::size_t kFew = 64;
+  std::set<double> values;
+  for (std::size_t i = 0; i < samples.size() && values.size() <= kFew; ++i) {
+    if (i < run.first || i > run.last) values.insert(axisValue(samples[i], axis));
+  }
+  return !values.empty() && values.size() <= kFew;
+}
+
 /// Adds imu_axis_stuck for an axis that keeps one value while the others of its sensor change.
 /// A gyroscope axis that is constant throughout may be that of a body that moves in a plane.
 void checkStuckAxes(const std::vector<ImuSample>& samples, DataFindings& findings) {
@@ -192,7 +199,7 @@ void checkStuckAxes(const std::vector<ImuSample>& samples, DataFindings& finding
       return axisValue(a, axis) == axisValue(b, axis);
     });
     if (run.count() < kFewestEqual || samples[run.last].time - samples[run.first].time < kLeast ||
-        (axis < 3 && run.count() == samples.size()) ||
+        (axis < 3 && run.count() == samples.size()) || isCoarse(samples, run, axis) ||
         shareOfChanges(samples, run, axis) < kChanges)
       continue;
     findings.push_back(
@@ -208,7 +215,7 @@ void checkStuckAxes(const std::vector<ImuSample>& samples, DataFindings& finding
 /// Adds imu_spike for single samples that are far from both neighbours, which have usual values.
 /// Shocks of a body last for several samples.
 void checkSpikes(const std::vector<ImuSample>& samples, DataFindings& findings) {
-  constexpr double kLeast_rad_s = 15.0, kLeast_m_s2 = 100.0, kUsual = 0.3;
+  constexpr double kLeast_rad_s = 15.0, kLeast_m_s2 = 150.0, kUsual = 0.3;
   for (Eigen::Index axis = 0; axis < 6; ++axis) {
     const double least = axis < 3 ? kLeast_rad_s : kLeast_m_s2;
     std::vector<double> values;
@@ -230,6 +237,7 @@ void checkSpikes(const std::vector<ImuSample>& samples, DataFindings& findings) 
                      spikes > 1 ? fmt::format(" (and {} more)", spikes - 1) : "", values[first],
                      unitOf(axis), "xyz"[axis % 3], sensorOf(axis), values[first - 1],
                      spikes > 1 ? "their lines" : "its line")});
+    return;
   }
 }
 
@@ -355,39 +363,6 @@ DataFindings checkData(const Recording& recording, const DataUse& use) {
     checkImages(recording, camera, findings);
   }
   return findings;
-}
-
-Result<cv::Mat> monoImageOf(const Recording::FrameFile& file, int reduce) {
-  if (!file.load) {
-    return vision::decodeImageFile(file.path, ImageEncoding::kMono8, vision::usedBits(file.path),
-                                   reduce);
-  }
-  const auto loaded = file.load();
-  if (!loaded) return tl::unexpected(loaded.error());
-  const auto frame = vision::decompressed(*loaded);
-  if (!frame) return tl::unexpected(frame.error());
-  auto image = vision::monoOf(*frame);
-  if (!image) return image;
-  cv::Mat copy;
-  cv::resize(*image, copy, {image->cols / reduce, image->rows / reduce}, 0, 0, cv::INTER_AREA);
-  return copy;
-}
-
-int reductionFor(const CameraCalibration& camera, std::uint32_t columns) {
-  int factor = 1;
-  while (factor < 8) {
-    const auto next = static_cast<std::uint32_t>(2 * factor);
-    if (camera.width / next < columns || camera.height / next < columns / 2) break;
-    factor *= 2;
-  }
-  return factor;
-}
-
-bool isOfCamera(const cv::Mat& reduced, int factor, const CameraCalibration& camera) {
-  const auto isOf = [&](int px, std::uint32_t of_camera) {
-    return std::abs(px * factor - static_cast<int>(of_camera)) < factor;
-  };
-  return isOf(reduced.cols, camera.width) && isOf(reduced.rows, camera.height);
 }
 
 void refuseFatal(const DataFindings& findings, const std::string& where) {

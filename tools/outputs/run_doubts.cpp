@@ -20,10 +20,12 @@ struct Rule {
 constexpr Rule kRules[] = {
     {"frame_without_update", 10, "no image point could be used",
      "their poses are from the IMU alone; check exposure, contrast, size and lens of the images"},
+    {"start_picture_moves_imu_does_not", 20, "the images moved but the IMU did not",
+     "if the drive begins in even motion, an IMU shows neither speed nor tilt: begin at rest or in "
+     "a turn, or record a speed; otherwise check the IMU"},
     {"images_contradict_imu", 20, "images contradict the IMU",
      "T_BS, the IMU's axes, signs or units, the focal length, time_offset_s or the order of the "
-     "images "
-     "may be wrong; see perdure doctor --data"},
+     "images may be wrong; see perdure doctor --data"},
     {"position_uncertain", 20, "the position is uncertain",
      "its standard deviation grew by more than vio.odometry.position_growth in ten seconds: turn "
      "less on the spot, or calibrate the rig (perdure doctor --data)"},
