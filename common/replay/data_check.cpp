@@ -205,7 +205,7 @@ void checkStuckAxes(const std::vector<ImuSample>& samples, DataFindings& finding
     findings.push_back(
         {Grade::kWarning, "imu_axis_stuck",
          fmt::format("the {} reads exactly {:.6g} {} along {} {}, while its other axes change: "
-                     "this axis is off, has failed, or its column was not recorded; {}",
+                     "this axis is off, saturated, has failed, or its column was not recorded; {}",
                      sensorOf(axis), axisValue(samples[run.first], axis), unitOf(axis),
                      "xyz"[axis % 3], placeOf(run, samples),
                      run.count() == samples.size() ? "record again" : "cut the drive there")});

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include "common/replay/data_check.h"
 #include "tools/data_check/motion_check.h"
@@ -35,5 +36,12 @@ bool hasStampStep(const replay::Recording& recording);
 /// interval of the images.
 replay::DataFindings judgeParts(std::vector<PartOffset> parts, const replay::Recording& recording,
                                 std::optional<double> least_s = {});
+
+/// Jumps of the stamps that may be clocks that were set, as text; empty if there are none. Omits
+/// lost images, whose intervals are whole multiples.
+std::string suspectJumps(const replay::Recording& recording);
+
+/// Code: imu_gap. Inertial samples are missing for over 0.2 s and 20 intervals between images.
+replay::DataFindings checkImuGaps(const replay::Recording& recording);
 
 }  // namespace perdure::tools

@@ -123,13 +123,16 @@ replay::DataFindings checkDrive(const replay::Recording& recording, const replay
     if (shift) *fatal = shiftFinding(*shift, recording.calibration.cameras.front()).front();
     return findings;
   }
+  const bool paused =
+      std::ranges::any_of(findings, [](const auto& one) { return one.code.starts_with("clock_"); });
+  if (use.imu && !paused) add("the samples", findings, [&] { return checkImuGaps(recording); });
   add("repeated images", findings, [&] { return checkFrozenImages(recording); });
   add("what belongs together", findings, [&] { return checkPairs(recording); });
   add("the two cameras", findings, [&] { return checkStereo(recording); });
   // With these, the rotations of images and gyroscope would differ too.
   const bool known = std::ranges::any_of(findings, [](const auto& one) {
-    return one.code == "stamps_of_arrival" || one.code == "imu_axis_stuck" ||
-           one.code == "imu_spike";
+    return one.code == "stamps_of_arrival" || one.code == "clock_set_alone" ||
+           one.code == "imu_axis_stuck" || one.code == "imu_spike";
   });
   if (use.imu && !known) add("turning", findings, [&] { return checkTurns(recording); });
   return findings;

@@ -53,6 +53,7 @@ Doubts doubtsOfFindings(const replay::DataFindings& findings) {
       {"imu_bursts", "the inertial samples have stamps of packets"},
       {"imu_saturated", "the IMU is saturated"},
       {"imu_axis_stuck", "an axis of the IMU keeps one value"},
+      {"imu_gap", "inertial samples are missing"},
       {"imu_spike", "samples of the IMU are corrupt"},
       {"gyro_", "gyroscope and images contradict each other"},
       {"time_offset", "camera and IMU do not agree in time"},
