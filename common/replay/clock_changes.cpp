@@ -211,7 +211,7 @@ void addSetAhead(const Recording& recording, const ClockChange& pause, DataFindi
       "{}: the stamps of {} jump ahead by {}, and end later by this time than "
       "those of the other sensor: its clock was set; subtract the time from there "
       "on, or cut the drive",
-      pause.place, nameOfSensor(pause.sensor), secondsText(stepOf(pause)));
+      pause.place, nameOfSensor(pause.sensor), secondsText(stepOf(pause) - pause.usual));
 }
 
 }  // namespace

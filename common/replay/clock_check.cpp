@@ -223,7 +223,7 @@ double latencyIn(const std::vector<double>& intervals, double usual) {
 /// no effect.
 void checkArrival(const std::vector<TimePoint>& images, DataFindings& findings) {
   constexpr std::size_t kFewestIntervals = 30;
-  constexpr double kLeast_s = 0.005, kShare = 0.08, kLow = 0.95, kHigh = 1.05, kIrregular = 0.3;
+  constexpr double kLeast_s = 0.004, kShare = 0.04, kLow = 0.95, kHigh = 1.05, kIrregular = 0.3;
   constexpr double kWhole = 0.1, kMostWhole = 0.9;  // regular images, some of which were dropped
   const auto intervals = intervalsOf(images);
   if (intervals.size() < kFewestIntervals) return;

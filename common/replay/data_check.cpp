@@ -5,15 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
+#include <set>
 
 #include "common/base/algorithms/median.h"
 #include "common/base/errors.h"
 #include "common/replay/clock_check.h"
 #include "common/replay/image_check.h"
-#include "common/vision/decode.h"
-#include "common/vision/image.h"
-#include "common/vision/jpeg.h"
 
 namespace perdure::replay {
 namespace {
@@ -118,32 +115,130 @@ void checkLost(const Recording& recording, const DataUse& use, DataFindings& fin
   }
 }
 
+/// The first and last sample of a run.
+struct Run {
+  std::size_t first = 0, last = 0;
+  std::size_t count() const { return last - first + 1; }
+};
+
+/// The longest run of samples that are the `same` as its first one.
+template <class Same>
+Run longestRun(const std::vector<ImuSample>& samples, const Same& same) {
+  Run longest;
+  for (std::size_t from = 0, i = 1; i < samples.size(); ++i) {
+    if (!same(samples[from], samples[i])) from = i;
+    if (i - from > longest.last - longest.first) longest = {from, i};
+  }
+  return longest;
+}
+
+/// "from … to … ns (… s, … samples)"
+std::string placeOf(const Run& run, const std::vector<ImuSample>& samples) {
+  const TimePoint from = samples[run.first].time, to = samples[run.last].time;
+  return fmt::format("from {} to {} ns ({:.1f} s, {} samples)", toNanoseconds(from),
+                     toNanoseconds(to), toSeconds(to - from), run.count());
+}
+
 /// Adds imu_repeats for the longest run of equal samples, if it is long: noise changes each sample
 /// of a sensor that measures.
 void checkRepeatedSamples(const std::vector<ImuSample>& samples, DataFindings& findings) {
   constexpr std::size_t kRepeated = 20;
   constexpr Duration kLeast = std::chrono::milliseconds(300);
-  const auto areSame = [](const ImuSample& a, const ImuSample& b) {
+  const Run run = longestRun(samples, [](const ImuSample& a, const ImuSample& b) {
     return a.gyro == b.gyro && a.accel == b.accel;
-  };
-  std::size_t first = 0, last = 0;
-  for (std::size_t from = 0, i = 1; i < samples.size(); ++i) {
-    if (!areSame(samples[from], samples[i])) from = i;
-    if (i - from > last - first) first = from, last = i;
-  }
-  const bool all = last - first + 1 == samples.size();  // made without noise
-  if (all || last - first < kRepeated || samples[last].time - samples[first].time < kLeast) return;
-  findings.push_back(
-      {Grade::kWarning, "imu_repeats",
-       fmt::format("the IMU repeats one sample from {} to {} ns ({:.1f} s, {} samples): its driver "
-                   "or its recorder stood still; cut the drive there",
-                   toNanoseconds(samples[first].time), toNanoseconds(samples[last].time),
-                   toSeconds(samples[last].time - samples[first].time), last - first + 1)});
+  });
+  const bool all = run.count() == samples.size();  // made without noise
+  if (all || run.count() <= kRepeated || samples[run.last].time - samples[run.first].time < kLeast)
+    return;
+  findings.push_back({Grade::kWarning, "imu_repeats",
+                      fmt::format("the IMU repeats one sample {}: its driver or its recorder "
+                                  "stood still; cut the drive there",
+                                  placeOf(run, samples))});
 }
 
 /// A value of a sample's six.
 double axisValue(const ImuSample& sample, Eigen::Index axis) {
   return axis < 3 ? sample.gyro[axis] : sample.accel[axis - 3];
+}
+
+const char* sensorOf(Eigen::Index axis) { return axis < 3 ? "gyroscope" : "accelerometer"; }
+const char* unitOf(Eigen::Index axis) { return axis < 3 ? "rad/s" : "m/s²"; }
+
+/// The share of the samples of a run at which both other axes of the sensor change.
+double shareOfChanges(const std::vector<ImuSample>& samples, const Run& run, Eigen::Index axis) {
+  const Eigen::Index sensor = axis / 3 * 3;
+  std::size_t changes = 0;
+  for (std::size_t i = run.first + 1; i <= run.last; ++i) {
+    bool both = true;
+    for (Eigen::Index other = sensor; other < sensor + 3; ++other) {
+      both &= other == axis || axisValue(samples[i], other) != axisValue(samples[i - 1], other);
+    }
+    changes += both ? 1 : 0;
+  }
+  return static_cast<double>(changes) / static_cast<double>(run.count());
+}
+
+/// Whether the axis has few different values outside of a run, although it changes there.
+bool isCoarse(const std::vector<ImuSample>& samples, const Run& run, Eigen::Index axis) {
+  constexpr std::size_t kFew = 64;
+  std::set<double> values;
+  for (std::size_t i = 0; i < samples.size() && values.size() <= kFew; ++i) {
+    if (i < run.first || i > run.last) values.insert(axisValue(samples[i], axis));
+  }
+  return !values.empty() && values.size() <= kFew;
+}
+
+/// Adds imu_axis_stuck for an axis that keeps one value while the others of its sensor change.
+/// A gyroscope axis that is constant throughout may be that of a body that moves in a plane.
+void checkStuckAxes(const std::vector<ImuSample>& samples, DataFindings& findings) {
+  constexpr std::size_t kFewestEqual = 100;
+  constexpr Duration kLeast = std::chrono::seconds(1);
+  constexpr double kChanges = 0.8;
+  for (Eigen::Index axis = 0; axis < 6; ++axis) {
+    const Run run = longestRun(samples, [axis](const ImuSample& a, const ImuSample& b) {
+      return axisValue(a, axis) == axisValue(b, axis);
+    });
+    if (run.count() < kFewestEqual || samples[run.last].time - samples[run.first].time < kLeast ||
+        (axis < 3 && run.count() == samples.size()) || isCoarse(samples, run, axis) ||
+        shareOfChanges(samples, run, axis) < kChanges)
+      continue;
+    findings.push_back(
+        {Grade::kWarning, "imu_axis_stuck",
+         fmt::format("the {} reads exactly {:.6g} {} along {} {}, while its other axes change: "
+                     "this axis is off, saturated, has failed, or its column was not recorded; {}",
+                     sensorOf(axis), axisValue(samples[run.first], axis), unitOf(axis),
+                     "xyz"[axis % 3], placeOf(run, samples),
+                     run.count() == samples.size() ? "record again" : "cut the drive there")});
+  }
+}
+
+/// Adds imu_spike for single samples that are far from both neighbours, which have usual values.
+/// Shocks of a body last for several samples.
+void checkSpikes(const std::vector<ImuSample>& samples, DataFindings& findings) {
+  constexpr double kLeast_rad_s = 15.0, kLeast_m_s2 = 150.0, kUsual = 0.3;
+  for (Eigen::Index axis = 0; axis < 6; ++axis) {
+    const double least = axis < 3 ? kLeast_rad_s : kLeast_m_s2;
+    std::vector<double> values;
+    for (const auto& sample : samples) values.push_back(axisValue(sample, axis));
+    const double median = medianOf(std::vector<double>(values));
+    std::size_t spikes = 0, first = 0;
+    for (std::size_t i = 1; i + 1 < samples.size(); ++i) {
+      const auto from_median = [&](std::size_t k) { return std::abs(values[k] - median); };
+      const double beside = std::max(from_median(i - 1), from_median(i + 1));
+      if (from_median(i) < least || beside > kUsual * from_median(i)) continue;
+      if (spikes++ == 0) first = i;
+    }
+    if (spikes == 0 || 50 * spikes > samples.size()) continue;
+    findings.push_back(
+        {Grade::kWarning, "imu_spike",
+         fmt::format("the sample at {} ns{} reads {:.4g} {} about {} of the {}, its neighbours "
+                     "{:.3g}: this is a transmission error; remove {}",
+                     toNanoseconds(samples[first].time),
+                     spikes > 1 ? fmt::format(" (and {} more)", spikes - 1) : "", values[first],
+                     unitOf(axis), "xyz"[axis % 3], sensorOf(axis), values[first - 1],
+                     spikes > 1 ? "their lines" : "its line")});
+    return;
+  }
 }
 
 /// How an axis of the IMU behaves at its largest value.
@@ -198,11 +293,11 @@ void checkSaturated(const std::vector<ImuSample>& samples, DataFindings& finding
          fmt::format(
              "the {} reads exactly {}{:.4g} {} about {} in {} samples ({:.0f} %) and never "
              "more: it is saturated; set a larger range of the sensor",
-             axis < 3 ? "gyroscope" : "accelerometer",
+             sensorOf(axis),
              at.positive && at.negative ? "±"
              : at.negative              ? "-"
                                         : "",
-             at.most, axis < 3 ? "rad/s" : "m/s²", "xyz"[axis % 3], at.samples,
+             at.most, unitOf(axis), "xyz"[axis % 3], at.samples,
              100.0 * static_cast<double>(at.samples) / static_cast<double>(samples.size()))});
     return;
   }
@@ -257,7 +352,10 @@ DataFindings checkData(const Recording& recording, const DataUse& use) {
     const DataFindings units = checkImuUnits(recording.imu);
     findings.insert(findings.end(), units.begin(), units.end());
     checkRepeatedSamples(recording.imu, findings);
+    const std::size_t before = findings.size();
     checkSaturated(recording.imu, findings);
+    if (findings.size() == before) checkStuckAxes(recording.imu, findings);
+    checkSpikes(recording.imu, findings);
   }
   if (!use.images) return findings;
   if (use.imu) checkUpright(recording, findings);
@@ -265,39 +363,6 @@ DataFindings checkData(const Recording& recording, const DataUse& use) {
     checkImages(recording, camera, findings);
   }
   return findings;
-}
-
-Result<cv::Mat> monoImageOf(const Recording::FrameFile& file, int reduce) {
-  if (!file.load) {
-    return vision::decodeImageFile(file.path, ImageEncoding::kMono8, vision::usedBits(file.path),
-                                   reduce);
-  }
-  const auto loaded = file.load();
-  if (!loaded) return tl::unexpected(loaded.error());
-  const auto frame = vision::decompressed(*loaded);
-  if (!frame) return tl::unexpected(frame.error());
-  auto image = vision::monoOf(*frame);
-  if (!image) return image;
-  cv::Mat copy;
-  cv::resize(*image, copy, {image->cols / reduce, image->rows / reduce}, 0, 0, cv::INTER_AREA);
-  return copy;
-}
-
-int reductionFor(const CameraCalibration& camera, std::uint32_t columns) {
-  int factor = 1;
-  while (factor < 8) {
-    const auto next = static_cast<std::uint32_t>(2 * factor);
-    if (camera.width / next < columns || camera.height / next < columns / 2) break;
-    factor *= 2;
-  }
-  return factor;
-}
-
-bool isOfCamera(const cv::Mat& reduced, int factor, const CameraCalibration& camera) {
-  const auto isOf = [&](int px, std::uint32_t of_camera) {
-    return std::abs(px * factor - static_cast<int>(of_camera)) < factor;
-  };
-  return isOf(reduced.cols, camera.width) && isOf(reduced.rows, camera.height);
 }
 
 void refuseFatal(const DataFindings& findings, const std::string& where) {

@@ -29,7 +29,8 @@ inline constexpr char kUpsideDown[] = "images upside down";
 /// Checks some images of each camera, the sizes of all files, and all stamps and samples. Codes:
 /// image_unreadable, images_unreadable, images_empty, image_size, image_flat, accel_in_g,
 /// accel_in_mg, accel_in_mm, accel_scale, accel_without_gravity, imu_columns_exchanged, gyro_scale,
-/// imu_repeats, imu_saturated, images_upside_down, lines_lost, and those of checkClocks().
+/// imu_repeats, imu_saturated, imu_axis_stuck, imu_spike, images_upside_down, lines_lost, and those
+/// of checkClocks().
 DataFindings checkData(const Recording& recording, const DataUse& use);
 
 /// Checks units and axes of the inertial samples only.

@@ -5,12 +5,15 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 #include <random>
 #include <set>
 
 #include "common/base/files/access.h"
 #include "common/replay/files/image_folder.h"
+#include "common/vision/decode.h"
+#include "common/vision/image.h"
+#include "common/vision/jpeg.h"
 
 namespace perdure::replay {
 namespace {
@@ -198,6 +201,39 @@ void checkImages(const Recording& recording, std::size_t camera, DataFindings& f
          fmt::format("the images of {} are of one grey: see exposure, lens cap and bit depth",
                      calibration.name)});
   }
+}
+
+Result<cv::Mat> monoImageOf(const Recording::FrameFile& file, int reduce) {
+  if (!file.load) {
+    return vision::decodeImageFile(file.path, ImageEncoding::kMono8, vision::usedBits(file.path),
+                                   reduce);
+  }
+  const auto loaded = file.load();
+  if (!loaded) return tl::unexpected(loaded.error());
+  const auto frame = vision::decompressed(*loaded);
+  if (!frame) return tl::unexpected(frame.error());
+  auto image = vision::monoOf(*frame);
+  if (!image) return image;
+  cv::Mat copy;
+  cv::resize(*image, copy, {image->cols / reduce, image->rows / reduce}, 0, 0, cv::INTER_AREA);
+  return copy;
+}
+
+int reductionFor(const CameraCalibration& camera, std::uint32_t columns) {
+  int factor = 1;
+  while (factor < 8) {
+    const auto next = static_cast<std::uint32_t>(2 * factor);
+    if (camera.width / next < columns || camera.height / next < columns / 2) break;
+    factor *= 2;
+  }
+  return factor;
+}
+
+bool isOfCamera(const cv::Mat& reduced, int factor, const CameraCalibration& camera) {
+  const auto isOf = [&](int px, std::uint32_t of_camera) {
+    return std::abs(px * factor - static_cast<int>(of_camera)) < factor;
+  };
+  return isOf(reduced.cols, camera.width) && isOf(reduced.rows, camera.height);
 }
 
 }  // namespace perdure::replay

@@ -207,7 +207,8 @@ class RosDriveReader {
   std::optional<M> valueIn(const RosMessage& message, const char* kind) {
     auto value = messages_.valueOf<M>(message);
     if (value) return *std::move(value);
-    if (!message.data.empty() && message.data[0] == '{') json_.insert(message.topic);
+    if (message.data.size() > 1 && message.data[0] == '{' && message.data[1] >= '\t')
+      json_.insert(message.topic);  // a binary number that begins so has a zero in its next byte
     recording_.reasons.add(std::string(kind) + "_malformed");
     return std::nullopt;
   }

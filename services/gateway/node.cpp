@@ -80,8 +80,9 @@ void Node::sendNow(std::uint32_t channel) {
   switch (channel) {
     case kTransforms:
       if (!body()) return;
-      return send(kTransforms, frameTransforms(time_, map_.T_MW(world()), pose(),
-                                               calibration_ ? &*calibration_ : nullptr));
+      return send(kTransforms,
+                  frameTransforms(time_, map_.T_MW(world()), pose(),
+                                  calibration_ ? &*calibration_ : nullptr, earth_.yawOf(world())));
     case kMapToOdom:
       if (const MapFrame* frame = map_.frameOf(world())) send(kMapToOdom, mapFrameJson(*frame));
       return;
@@ -137,6 +138,7 @@ void Node::sendNow(std::size_t camera, std::uint32_t channel) {
 
 void Node::onCalibration(const Calibration& calibration) {
   calibration_ = calibration;
+  earth_.onCalibration(calibration);
   for (std::size_t i = 0; i < config_.cameras.size(); ++i) {
     const CameraCalibration* camera = calibration.camera(config_.cameras[i]);
     cameras_[i].reset();
@@ -163,6 +165,7 @@ void Node::onFrameOfBefore(std::size_t camera, const Frame& frame) {
 
 void Node::onOdometry(const Odometry& odometry, std::int64_t now_ns) {
   last_.odometry_ns = now_ns;
+  earth_.onOdometry(odometry);
   if (odometry.state == OdometryState::kInitialising) return;
   // If W changes, M may change too, and with it the displayed part of the map.
   map_due_ = map_due_ || (!map_.empty() && world() != odometry.world);

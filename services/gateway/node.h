@@ -12,6 +12,7 @@
 #include "common/base/result.h"
 #include "common/base/sink.h"
 #include "common/camera/camera_model.h"
+#include "common/earth/earth_place.h"
 #include "common/types/map.h"
 #include "common/types/odometry.h"
 #include "services/gateway/config.h"
@@ -166,6 +167,7 @@ class Node {
   double latency_ms_ = -1.0;
   Scene scene_;
   Trajectory trajectory_;
+  EarthPlace earth_;
   SeenGround seen_ground_;
   History history_;
   std::vector<Pace> image_pace_;

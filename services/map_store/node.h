@@ -14,6 +14,7 @@
 #include "common/base/ids.h"
 #include "common/base/result.h"
 #include "common/base/sink.h"
+#include "common/earth/earth_place.h"
 #include "common/mapping/mapper.h"
 #include "common/types/map.h"
 #include "common/types/objects.h"
@@ -22,7 +23,6 @@
 #include "services/map_store/core/map_places.h"
 #include "services/map_store/core/reply_cache.h"
 #include "services/map_store/core/tile_book.h"
-#include "services/map_store/earth_place.h"
 
 namespace perdure::map_store {
 

@@ -1,11 +1,11 @@
 // Targets: the content of the map file. Beliefs and parts of the graph are blobs; the whole graph
 // is a set of rows; the place on Earth is a text.
+#include "common/earth/earth_place.h"
 #include "common/mapping/mapper.h"
 #include "services/map_store/core/belief_codec.h"
 #include "services/map_store/core/earth_anchor.h"
 #include "services/map_store/core/graph/graph_answer.h"
 #include "services/map_store/core/graph/graph_tables.h"
-#include "services/map_store/earth_place.h"
 #include "tests/common/wire/examples.h"
 #include "tests/fuzz/target.h"
 #include "tests/services/map_store/graphs.h"

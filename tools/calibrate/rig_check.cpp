@@ -160,6 +160,10 @@ double againstOf(const RigCheck& check) {
 }
 
 constexpr double kFewAgainst = 0.05, kManyAgainst = 0.2;
+constexpr std::size_t kFewEven = 4;
+constexpr char kEvenStart[] =
+    "it begins in even motion, by which an IMU shows neither speed nor tilt: begin at rest or in a "
+    "turn, or record a speed; otherwise ";
 
 /// Reports several deviations as one if they have one cause, because their values have no meaning
 /// then.
@@ -205,6 +209,7 @@ RigCheck RigWatch::check(const ReasonCounts& of_vio) const {
   check.holes = of_vio.of("clock_jumped_or_blackout") + of_vio.of("imu_gap_too_long") +
                 of_vio.of("clock_jumped_back");
   check.speed_refused = of_vio.of("speed_gated");
+  check.even = of_vio.of("start_picture_moves_imu_does_not");
   check.contradicted = of_vio.of("images_contradict_imu");
   const auto saved = vio::fromText(saved_);
   if (!saved || gyro_.empty()) return check;
@@ -323,10 +328,10 @@ Judgements judgeRig(const RigCheck& check) {
   if (against > kFewAgainst) {
     all.push_back(
         {many_against ? Grade::kBad : Grade::kDoubtful,
-         fmt::format("images contradict the IMU in {:.0f} % of the drive; see T_BS (is it the "
+         fmt::format("images contradict the IMU in {:.0f} % of the drive; {}see T_BS (is it the "
                      "inverse?), the IMU's axes, signs and units (radians per second), the focal "
                      "length and time_offset_s, or whether what moves fills the picture{}",
-                     100.0 * against,
+                     100.0 * against, check.even > kFewEven ? kEvenStart : "",
                      many_against
                          ? "; correct nothing by the numbers below before these are excluded"
                          : "")});

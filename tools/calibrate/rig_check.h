@@ -30,6 +30,7 @@ struct RigCheck {
   std::size_t frames = 0, tracked = 0, resets = 0;
   std::size_t holes = 0;  ///< resets after a jump of stamps or missing samples
   std::size_t speed_refused = 0;
+  std::size_t even = 0;          ///< images that moved before the start while the IMU did not
   std::size_t contradicted = 0;  ///< frames at which most points of the last seconds were rejected
   std::vector<vio::Innovation> innovations;
   bool believed = false;  ///< vio started, so that the following four are valid

@@ -149,4 +149,27 @@ replay::DataFindings judgeAxes(const std::vector<Turn>& turns,
                        textOf(best), 100.0 * least->of_changed, pairs.count())}};
 }
 
+replay::DataFindings judgeAxisFactors(const std::vector<Turn>& turns,
+                                      const std::vector<ImuSample>& samples,
+                                      const CameraCalibration& camera) {
+  // A translation beside near objects resembles a small rotation.
+  constexpr double kLeast = 0.15, kSurely = 4.0, kLeft = 0.05, kMuch_px = 1.0;
+  const TurnPairs pairs = pairsInBody(turns, samples, camera);
+  if (pairs.count() < kFewestPairs) return {};
+  const auto count = static_cast<double>(pairs.count());
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const auto images = pairs.reference.row(i), said = pairs.given.row(i);
+    const double all = std::max(1e-18, said.squaredNorm()), turning = images.squaredNorm();
+    const double shown = images.dot(said) / all, left = (images - shown * said).squaredNorm();
+    const bool seen = camera.fx * std::sqrt(turning / count) > kMuch_px && left < kLeft * turning;
+    const double least = kLeast + kSurely * std::sqrt(left / (count * all));
+    if (!seen || shown <= 0.0 || std::abs(shown - 1.0) < least) continue;
+    return {{replay::DataFinding::Grade::kWarning, "gyro_axis_factor",
+             fmt::format("the gyroscope's w_{} is {:.2f} times the turning about this axis that {} "
+                         "shows, in {} pairs of images: see the scale of this column",
+                         "xyz"[i], 1.0 / shown, camera.name, pairs.count())}};
+  }
+  return {};
+}
+
 }  // namespace perdure::tools

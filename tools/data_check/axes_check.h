@@ -21,4 +21,9 @@ replay::DataFindings judgeConstantAxis(const std::vector<Turn>& turns,
                                        const std::vector<ImuSample>& samples,
                                        const CameraCalibration& camera);
 
+/// Code: gyro_axis_factor. An axis of the gyroscope whose scale is wrong by over 15 %.
+replay::DataFindings judgeAxisFactors(const std::vector<Turn>& turns,
+                                      const std::vector<ImuSample>& samples,
+                                      const CameraCalibration& camera);
+
 }  // namespace perdure::tools

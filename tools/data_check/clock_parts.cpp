@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <optional>
 
 #include "common/base/algorithms/median.h"
@@ -73,18 +74,20 @@ struct Course {
   std::size_t split = 0;             ///< number of parts before the step; 0: a line
 };
 
-/// Adds the deviations of the parts, in standard deviations and limited; a part that contains the
-/// step may deviate.
-double deviationsOf(const Parts& parts, const Course& course) {
+/// A deviation in standard deviations, limited, because a part that contains a step may deviate.
+double costOf(double off_s, double sigma_s) {
   constexpr double kLeast_s = 0.003, kMost = 6.0;
+  return std::min(kMost, std::abs(off_s) / std::hypot(kLeast_s, sigma_s));
+}
+
+double deviationsOf(const Parts& parts, const Course& course) {
   double sum = 0.0;
   for (std::size_t i = 0; i < parts.size(); ++i) {
     const double at = course.split == 0
                           ? course.change * toSeconds(timeOf(parts[i]) - timeOf(parts[0]))
                       : i < course.split ? 0.0
                                          : course.change;
-    const double off = std::abs(parts[i].offset_s - course.first - at);
-    sum += std::min(kMost, off / std::hypot(kLeast_s, parts[i].sigma_s));
+    sum += costOf(parts[i].offset_s - course.first - at, parts[i].sigma_s);
   }
   return sum;
 }
@@ -147,51 +150,108 @@ std::vector<replay::Recording::FrameFile> framesOf(const replay::Recording& reco
   return frames;
 }
 
-/// The stamp between two times before which the interval contains a step of about `change_s`.
-struct StampStep {
+/// A long or short interval before a stamp: a pause, lost data, or a clock that was set.
+struct Jump {
   TimePoint time;
-  double off_s = 1e9;     ///< difference of `excess_s` from `change_s`
   double excess_s = 0.0;  ///< of the interval over the usual one
+  bool of_imu = false;
+};
+using Jumps = std::vector<Jump>;
+
+void addJumps(const Stamps& stamps, bool of_imu, Jumps& jumps) {
+  constexpr double kLeast_s = 0.01, kSpreads = 8.0;
+  std::vector<double> spread;
+  for (const double one : stamps.intervals) spread.push_back(std::abs(one - stamps.usual));
+  const double least = std::max(kLeast_s, kSpreads * medianOf(std::move(spread)));
+  for (std::size_t i = 0; i < stamps.intervals.size(); ++i) {
+    const double excess = stamps.intervals[i] - stamps.usual;
+    if (std::abs(excess) > least) jumps.push_back({stamps.times[i + 1], excess, of_imu});
+  }
+}
+
+/// The largest jumps, in the order of time.
+Jumps jumpsIn(const replay::Recording& recording) {
+  constexpr std::size_t kMost = 8;
+  Jumps jumps;
+  addJumps(Stamps(recording.imu), true, jumps);
+  addJumps(Stamps(framesOf(recording)), false, jumps);
+  std::ranges::sort(jumps, std::greater<>(),
+                    [](const Jump& one) { return std::abs(one.excess_s); });
+  jumps.resize(std::min(jumps.size(), kMost));
+  std::ranges::sort(jumps, {}, &Jump::time);
+  return jumps;
+}
+
+/// The deviations of the parts if each of these jumps is a clock that was set.
+double deviationsAfter(const Parts& parts, const Jumps& set) {
+  constexpr double kEach = 1.0;  // of an assumption
+  std::vector<double> offsets, sigmas;
+  for (const PartOffset& part : parts) {
+    double change = 0.0;
+    bool inside = false;
+    for (const Jump& jump : set) {
+      inside = inside || (jump.time > part.from && jump.time <= part.to);
+      if (jump.time <= part.from) change += jump.of_imu ? jump.excess_s : -jump.excess_s;
+    }
+    if (inside) continue;
+    offsets.push_back(part.offset_s - change), sigmas.push_back(part.sigma_s);
+  }
+  const double first = medianOf(std::vector<double>(offsets));
+  double sum = kEach * static_cast<double>(set.size());
+  for (std::size_t i = 0; i < offsets.size(); ++i) sum += costOf(offsets[i] - first, sigmas[i]);
+  return sum;
+}
+
+/// The jumps of the stamps that explain the offsets best; none if they need no explanation.
+struct Explained {
+  Jumps set;
+  double worst = 0.0;  ///< sum of the deviations
 };
 
-StampStep stepIn(const Stamps& stamps, TimePoint from, TimePoint to, double change_s) {
-  StampStep best;
-  for (std::size_t i = 0; i < stamps.intervals.size(); ++i) {
-    if (stamps.times[i] < from || stamps.times[i + 1] > to) continue;
-    const double excess = stamps.intervals[i] - stamps.usual, off = std::abs(excess - change_s);
-    if (off < best.off_s) best = {stamps.times[i + 1], off, excess};
+Explained explainedBy(const Jumps& jumps, const Parts& parts) {
+  Explained best{{}, deviationsAfter(parts, {})};
+  for (unsigned chosen = 1; chosen < 1U << jumps.size(); ++chosen) {
+    Jumps set;
+    for (std::size_t i = 0; i < jumps.size(); ++i) {
+      if (chosen >> i & 1U) set.push_back(jumps[i]);
+    }
+    const double worst = deviationsAfter(parts, set);
+    if (worst < best.worst) best = {std::move(set), worst};
   }
   return best;
 }
 
+constexpr char kRemove[] = "remove the step from the stamps behind it, or cut the drive there";
+
+std::string textOf(const Jumps& jumps, const std::string& camera) {
+  std::string text;
+  for (const Jump& jump : jumps) {
+    text += fmt::format("{}at {} ns the stamps of {} jump {} by {:.3f} s", text.empty() ? "" : ", ",
+                        toNanoseconds(jump.time), jump.of_imu ? "the IMU" : camera,
+                        jump.excess_s > 0.0 ? "ahead" : "back", std::abs(jump.excess_s));
+  }
+  return text;
+}
+
+replay::DataFindings jumpsFinding(const Jumps& set, const std::string& camera) {
+  return {
+      {replay::DataFinding::Grade::kWarning, "clock_step",
+       fmt::format("{}; without {}, gyroscope and images turn together: {}", textOf(set, camera),
+                   set.size() == 1 ? "this step" : "these steps", kRemove)}};
+}
+
 replay::DataFindings stepFinding(const Parts& parts, const Course& step,
-                                 const replay::Recording& recording) {
+                                 const replay::Recording& recording, double least_s) {
   const PartOffset &before = parts[step.split - 1], &after = parts[step.split];
-  const double near_s =
-      std::min(std::max(0.02, 0.25 * std::abs(step.change)), 0.5 * std::abs(step.change));
-  const Duration beside = std::chrono::milliseconds(500);
-  const StampStep imu = stepIn(Stamps(recording.imu), before.from - beside, after.to + beside,
-                               step.change),
-                  images = stepIn(Stamps(framesOf(recording)), before.from, after.to, -step.change);
-  const StampStep& found = imu.off_s <= images.off_s ? imu : images;
-  const bool seen = found.off_s < near_s;
-  // Without a stamp that jumps, one part may be off, and long intervals blur the offsets.
-  const double usual_s = Stamps(framesOf(recording)).usual;
-  if (!seen &&
-      (step.split < 2 || step.split + 2 > parts.size() || std::abs(step.change) < usual_s / 3.0))
-    return {};
-  const std::string of_camera = recording.calibration.cameras.front().name;
-  const std::string place =
-      seen ? fmt::format("at {} ns the stamps of {} jump {} by {:.3f} s", toNanoseconds(found.time),
-                         &found == &imu ? "the IMU" : of_camera,
-                         found.excess_s > 0.0 ? "ahead" : "back", std::abs(found.excess_s))
-           : fmt::format("between {} and {} ns the clock of {} or of the IMU was set",
-                         toNanoseconds(timeOf(before)), toNanoseconds(timeOf(after)), of_camera);
+  // One part may be off, and long intervals blur the offsets.
+  if (step.split < 2 || step.split + 2 > parts.size() || std::abs(step.change) < least_s) return {};
   return {{replay::DataFinding::Grade::kWarning, "clock_step",
-           fmt::format("{}: gyroscope and images turn together at an offset of {:.3f} s before and "
-                       "of {:.3f} s after; remove the step from the stamps behind it, or cut the "
-                       "drive there",
-                       place, step.first, step.first + step.change)}};
+           fmt::format("between {} and {} ns the clock of {} or of the IMU was set: gyroscope and "
+                       "images turn together at an offset of {:.3f} s before and of {:.3f} s "
+                       "after; {}",
+                       toNanoseconds(timeOf(before)), toNanoseconds(timeOf(after)),
+                       recording.calibration.cameras.front().name, step.first,
+                       step.first + step.change, kRemove)}};
 }
 
 }  // namespace
@@ -247,21 +307,61 @@ bool hasStampStep(const replay::Recording& recording) {
          isIrregular(Stamps(framesOf(recording)), kOfImages);
 }
 
-replay::DataFindings judgeParts(Parts parts, const replay::Recording& recording) {
-  constexpr std::size_t kFewest = 4;
-  constexpr double kOrdinary = 1.6, kBetter = 0.5, kLeast_s = 0.015;
-  if (parts.size() < kFewest || !offsetsDiffer(parts)) return {};
+replay::DataFindings judgeParts(Parts parts, const replay::Recording& recording,
+                                std::optional<double> least_s) {
+  constexpr std::size_t kFewest = 3, kFewestOfCourse = 4;
+  constexpr double kOrdinary = 1.6, kBetter = 0.55, kLeast_s = 0.015, kSurely = 6.0;
+  if (parts.size() < kFewest) return {};
   std::ranges::sort(parts, {}, &PartOffset::from);
-  const Course line = lineOf(parts), step = stepOf(parts);
   const Course constant{.first = medianIn(parts, 0, parts.size()), .split = parts.size()};
   const auto count = static_cast<double>(parts.size());
-  const double enough = std::min(kOrdinary * count, kBetter * deviationsOf(parts, constant));
+  const double before = deviationsOf(parts, constant);
+  const double enough = std::min(kOrdinary * count, kBetter * before);
+  const Course line = lineOf(parts), step = stepOf(parts);
+  const Explained jumps = explainedBy(jumpsIn(recording), parts);
+  const CameraCalibration& camera = recording.calibration.cameras.front();
+  // A step or a rate that the stamps do not show needs a gap of the same length, which is rare.
+  constexpr double kRare = 1.5;
+  if (!jumps.set.empty() && jumps.worst < std::min({enough, before - kSurely, kRare * line.worst}))
+    return jumpsFinding(jumps.set, camera.name);
+  if (parts.size() < kFewestOfCourse || !offsetsDiffer(parts)) return {};
   const double lasts = toSeconds(timeOf(parts.back()) - timeOf(parts.front()));
-  const double least = std::max(kLeast_s, Stamps(framesOf(recording)).usual / 3.0);
-  if (line.worst <= step.worst && line.worst < enough && std::abs(line.change) * lasts > least)
-    return rateFinding(line.change, recording.calibration.cameras.front());
+  const double least =
+      std::max(kLeast_s, least_s ? *least_s : Stamps(framesOf(recording)).usual / 3.0);
+  if (line.worst <= kRare * step.worst && line.worst < enough &&
+      std::abs(line.change) * lasts > least)
+    return rateFinding(line.change, camera);
   if (step.worst < enough && std::abs(step.change) > kLeast_s)
-    return stepFinding(parts, step, recording);
+    return stepFinding(parts, step, recording, least);
+  return {};
+}
+
+std::string suspectJumps(const replay::Recording& recording) {
+  constexpr double kWhole = 0.15;
+  const double usual = Stamps(framesOf(recording)).usual;
+  Jumps jumps = jumpsIn(recording);
+  std::erase_if(jumps, [&](const Jump& jump) {  // lost images
+    const double times = jump.excess_s / usual;
+    return !jump.of_imu && std::abs(times - std::round(times)) < kWhole;
+  });
+  return textOf(jumps, recording.calibration.cameras.front().name);
+}
+
+replay::DataFindings checkImuGaps(const replay::Recording& recording) {
+  constexpr double kLeast_s = 0.2, kIntervals = 20.0;
+  const Stamps imu(recording.imu);
+  for (std::size_t i = 0; i < imu.intervals.size(); ++i) {
+    const TimePoint from = imu.times[i], to = imu.times[i + 1];
+    const bool seen = std::ranges::any_of(
+        recording.frames, [&](const auto& frame) { return frame.time > from && frame.time < to; });
+    if (!seen || imu.intervals[i] < std::max(kLeast_s, kIntervals * imu.usual)) continue;
+    return {
+        {replay::DataFinding::Grade::kWarning, "imu_gap",
+         fmt::format("no inertial samples for {:.2f} s from {} ns, while the images go on: they "
+                     "were lost, or the IMU's clock was set; record again, or cut the drive "
+                     "there",
+                     imu.intervals[i], toNanoseconds(from))}};
+  }
   return {};
 }
 

@@ -2,6 +2,9 @@
 // reveals a clock that was set by less than a second, or that runs slightly too fast.
 #pragma once
 
+#include <optional>
+#include <string>
+
 #include "common/replay/data_check.h"
 #include "tools/data_check/motion_check.h"
 
@@ -28,7 +31,17 @@ bool offsetsDiffer(std::vector<PartOffset> parts, const CameraCalibration& camer
 bool hasStampStep(const replay::Recording& recording);
 
 /// Codes: clock_step (one change of the offset, with its place), clock_rate (the offset changes
-/// evenly). Returns nothing unless one of them explains the offsets.
-replay::DataFindings judgeParts(std::vector<PartOffset> parts, const replay::Recording& recording);
+/// evenly). Returns nothing unless one of them explains the offsets. Smaller changes than
+/// `least_s` are not reported, except for steps in the stamps; by default a third of the usual
+/// interval of the images.
+replay::DataFindings judgeParts(std::vector<PartOffset> parts, const replay::Recording& recording,
+                                std::optional<double> least_s = {});
+
+/// Jumps of the stamps that may be clocks that were set, as text; empty if there are none. Omits
+/// lost images, whose intervals are whole multiples.
+std::string suspectJumps(const replay::Recording& recording);
+
+/// Code: imu_gap. Inertial samples are missing for over 0.2 s and 20 intervals between images.
+replay::DataFindings checkImuGaps(const replay::Recording& recording);
 
 }  // namespace perdure::tools

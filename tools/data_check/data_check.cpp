@@ -52,7 +52,8 @@ bool offsetExplainsAxes(const std::vector<Turn>& turns, const std::vector<ImuSam
 bool surelyAgree(const std::vector<Turn>& turns, const std::vector<ImuSample>& samples,
                  const CameraCalibration& camera) {
   return axesSurelyAgree(turns, samples, camera) && !disagree(turns, samples, camera) &&
-         judgeTurns(turns, samples, camera).empty() && judgeAxes(turns, samples, camera).empty();
+         judgeTurns(turns, samples, camera).empty() && judgeAxes(turns, samples, camera).empty() &&
+         judgeAxisFactors(turns, samples, camera).empty();
 }
 
 constexpr std::size_t kMany = 120;  // an axis with little rotation needs more pairs
@@ -69,6 +70,7 @@ replay::DataFindings checkAxes(const replay::Recording& recording,
     auto flips = judgeFlips(turnsOfImages(recording, lively, kMany, &known), recording.imu, camera);
     if (!flips.empty()) return flips;
   }
+  if (axes.empty() && found.empty()) axes = judgeAxisFactors(turns, recording.imu, camera);
   if (!axes.empty()) {
     const bool offset = !found.empty() && found.front().code == "time_offset";
     if (!offset || !offsetExplainsAxes(turns, recording.imu, camera)) return axes;
@@ -121,12 +123,18 @@ replay::DataFindings checkDrive(const replay::Recording& recording, const replay
     if (shift) *fatal = shiftFinding(*shift, recording.calibration.cameras.front()).front();
     return findings;
   }
+  const bool paused =
+      std::ranges::any_of(findings, [](const auto& one) { return one.code.starts_with("clock_"); });
+  if (use.imu && !paused) add("the samples", findings, [&] { return checkImuGaps(recording); });
   add("repeated images", findings, [&] { return checkFrozenImages(recording); });
   add("what belongs together", findings, [&] { return checkPairs(recording); });
   add("the two cameras", findings, [&] { return checkStereo(recording); });
-  const bool irregular = std::ranges::any_of(
-      findings, [](const auto& one) { return one.code == "stamps_of_arrival"; });
-  if (use.imu && !irregular) add("turning", findings, [&] { return checkTurns(recording); });
+  // With these, the rotations of images and gyroscope would differ too.
+  const bool known = std::ranges::any_of(findings, [](const auto& one) {
+    return one.code == "stamps_of_arrival" || one.code == "clock_set_alone" ||
+           one.code == "imu_axis_stuck" || one.code == "imu_spike";
+  });
+  if (use.imu && !known) add("turning", findings, [&] { return checkTurns(recording); });
   return findings;
 }
 

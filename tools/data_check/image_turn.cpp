@@ -119,10 +119,12 @@ std::vector<std::optional<cv::Point2f>> follow(const FollowedImage& first,
   std::vector<cv::Point2f> to, back;
   std::vector<uchar> found, found_back;
   std::vector<float> error;
-  cv::calcOpticalFlowPyrLK(first.pyramid, second.pyramid, from, to, found, error, kWindow, kLevels);
+  const cv::TermCriteria until(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 20, 0.03);
+  cv::calcOpticalFlowPyrLK(first.pyramid, second.pyramid, from, to, found, error, kWindow, kLevels,
+                           until);
   // Rejects points that backward tracking does not return to their origin.
   cv::calcOpticalFlowPyrLK(second.pyramid, first.pyramid, to, back, found_back, error, kWindow,
-                           kLevels);
+                           kLevels, until);
   constexpr double kBack_px = 1.0;
   for (std::size_t i = 0; i < from.size(); ++i) {
     const bool good = found[i] != 0 && found_back[i] != 0;

@@ -5,6 +5,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <iterator>
 #include <utility>
 #include <vector>
@@ -27,7 +28,7 @@ struct Change {
   Doubt doubt;
   Eigen::Vector4d A{1, 0, 0, 1};  ///< right pixel = [A0 A1; A2 A3] · given pixel + b
   Eigen::Vector2d b{0, 0};
-  std::uint64_t times = 1;  ///< right frame number = times · given number
+  std::int64_t times = 1, shift = 0;  ///< right frame number = times · given number + shift
 };
 
 /// The smallest and largest coordinates of all boxes.
@@ -135,8 +136,9 @@ std::optional<double> residualAfter(const Change& change, const Chain& chain, co
   const Eigen::Matrix2d A{{change.A(0), change.A(1)}, {change.A(2), change.A(3)}};
   std::vector<View> views;
   for (const auto& [number, box] : chain) {
-    const auto frame = frames.find(change.times * number);
-    if (frame == frames.end() || !frame->second.has_objects) continue;
+    const std::int64_t right = change.times * static_cast<std::int64_t>(number) + change.shift;
+    const auto frame = frames.find(static_cast<std::uint64_t>(right));
+    if (right < 0 || frame == frames.end() || !frame->second.has_objects) continue;
     const Eigen::Vector2d centre(0.5 * (box.x1 + box.x2), 0.5 * (box.y1 + box.y2));
     const auto at = camera.unproject(A * centre + change.b);
     if (!at) return kWorst;
@@ -166,6 +168,14 @@ std::vector<Change> changesOfPixels(const CameraModel& camera, const Box& all) {
       {{"boxes count y from the lower border", "write " + y}, {1, 0, 0, -1}, {0, H}},
       {{"boxes are turned by 180°", "write " + x + ", " + y}, {-1, 0, 0, -1}, {W, H}},
       {{"x and y of the boxes are exchanged", "write x in the columns of y"}, {0, 1, 1, 0}},
+      {{"boxes are of images turned by 90°",
+        fmt::format("write x1 = y1, x2 = y2, y1 = {0:.0f} - x2, y2 = {0:.0f} - x1", H)},
+       {0, 1, -1, 0},
+       {0, H}},
+      {{"boxes are of images turned by 90°",
+        fmt::format("write x1 = {0:.0f} - y2, x2 = {0:.0f} - y1, y1 = x1, y2 = x2", W)},
+       {0, -1, 1, 0},
+       {W, 0}},
       {{"boxes are shifted (crop or margin)",
         fmt::format("add {:.0f} to x1 and x2, {:.0f} to y1 and y2", W - all.x2, H - all.y2)},
        {1, 0, 0, 1},
@@ -178,11 +188,14 @@ std::vector<Change> changesOfPixels(const CameraModel& camera, const Box& all) {
          {1 / s, 0, 0, 1 / s},
          {0, -above}});
   }
-  for (const double factor : {0.5, 0.67, 0.75, 0.8, 1.25, 1.33, 1.5, 2.0, 3.0, 4.0}) {
+  for (const double factor :
+       {0.5, 0.67, 0.75, 0.8, 0.9, 0.95, 1.05, 1.1, 1.25, 1.33, 1.5, 2.0, 3.0, 4.0}) {
     changes.push_back(scaled(factor, factor, ", roughly"));
   }
   return changes;
 }
+
+constexpr char kWrongNumbers[] = "boxes have wrong frame numbers";
 
 /// Changes of frame numbers that do not exceed those of the drive.
 std::vector<Change> changesOfNumbers(const Frames& frames) {
@@ -197,8 +210,18 @@ std::vector<Change> changesOfNumbers(const Frames& frames) {
     const std::string fix = fmt::format(
         "the detector saw one frame in {} and counted these; multiply the numbers by {}", times,
         times);
-    changes.push_back({.doubt = {"boxes have wrong frame numbers", fix}, .times = times});
+    changes.push_back({.doubt = {kWrongNumbers, fix}, .times = static_cast<std::int64_t>(times)});
   }
+  for (const std::int64_t by : {-20, -10, -5, -4, -3, -2, -1, 1, 2, 3, 4, 5, 10, 20}) {
+    const std::string fix = fmt::format("{} about {} {} the numbers", by > 0 ? "add" : "subtract",
+                                        std::abs(by), by > 0 ? "to" : "from");
+    changes.push_back({.doubt = {kWrongNumbers, fix}, .shift = by});
+  }
+  changes.push_back({.doubt = {kWrongNumbers, fmt::format("the frames are in reverse order: write {} - "
+                                                     "number",
+                                                     last)},
+                     .times = -1,
+                     .shift = static_cast<std::int64_t>(last)});
   return changes;
 }
 
@@ -208,19 +231,36 @@ struct Fit {
   Doubt doubt;
 };
 
+/// A chain with its residual as given.
+struct Given {
+  const Chain* chain = nullptr;
+  double residual = 0.0;
+};
+
+/// Some of the chains, those whose frames have poses.
+std::vector<Given> givenOf(const std::vector<Chain>& chains, const Frames& frames,
+                           const CameraModel& camera) {
+  constexpr std::size_t kMost = 300;
+  std::vector<Given> given;
+  for (std::size_t i = 0; i < chains.size(); i += 1 + chains.size() / kMost) {
+    const auto residual = residualAfter({}, chains[i], frames, camera);
+    if (residual) given.push_back({&chains[i], *residual});
+  }
+  return given;
+}
+
 /// Returns nothing if the change does not improve most chains, and clearly.
-std::optional<Fit> fitOf(const Change& change, const std::vector<Chain>& chains,
+std::optional<Fit> fitOf(const Change& change, const std::vector<Given>& chains,
                          const Frames& frames, const CameraModel& camera) {
-  constexpr std::size_t kLeast = 10, kMost = 300;
+  constexpr std::size_t kLeast = 10;
   constexpr double kClearly = 0.7;  // largest ratio of the residuals, least share of the chains
   std::vector<double> as_given, changed;
   double better = 0.0;
-  for (std::size_t i = 0; i < chains.size(); i += 1 + chains.size() / kMost) {
-    const auto own = residualAfter({}, chains[i], frames, camera);
-    const auto other = residualAfter(change, chains[i], frames, camera);
-    if (!own || !other) continue;
-    as_given.push_back(*own), changed.push_back(*other);
-    better += *other < *own ? 1.0 : 0.0;
+  for (const Given& given : chains) {
+    const auto other = residualAfter(change, *given.chain, frames, camera);
+    if (!other) continue;
+    as_given.push_back(given.residual), changed.push_back(*other);
+    better += *other < given.residual ? 1.0 : 0.0;
   }
   const auto tracks = static_cast<double>(changed.size());
   const double now = medianOf(changed), before = medianOf(as_given);
@@ -241,11 +281,12 @@ std::optional<Doubt> doubtOfBoxes(const Frames& frames, const CameraCalibration&
   constexpr double kEqual = 1.1;  // ratio of residuals that do not distinguish two changes
   const CameraModel camera(calibration);
   const Chains chains(frames);
+  const auto given = givenOf(chains.whole(), frames, camera);
   std::vector<Change> changes = changesOfPixels(camera, extentOf(frames));
   std::ranges::move(changesOfNumbers(frames), std::back_inserter(changes));
   std::vector<Fit> fits;
   for (const Change& change : changes) {
-    if (auto fit = fitOf(change, chains.whole(), frames, camera)) fits.push_back(*std::move(fit));
+    if (auto fit = fitOf(change, given, frames, camera)) fits.push_back(*std::move(fit));
   }
   if (fits.empty()) return std::nullopt;
   const Fit best = *std::ranges::min_element(fits, {}, &Fit::residual);

@@ -20,9 +20,12 @@ struct Rule {
 constexpr Rule kRules[] = {
     {"frame_without_update", 10, "no image point could be used",
      "their poses are from the IMU alone; check exposure, contrast, size and lens of the images"},
+    {"start_picture_moves_imu_does_not", 20, "the images moved but the IMU did not",
+     "if the drive begins in even motion, an IMU shows neither speed nor tilt: begin at rest or in "
+     "a turn, or record a speed; otherwise check the IMU"},
     {"images_contradict_imu", 20, "images contradict the IMU",
-     "T_BS, the IMU's axes, signs or units, the focal length or time_offset_s may be wrong; see "
-     "perdure doctor --data"},
+     "T_BS, the IMU's axes, signs or units, the focal length, time_offset_s or the order of the "
+     "images may be wrong; see perdure doctor --data"},
     {"position_uncertain", 20, "the position is uncertain",
      "its standard deviation grew by more than vio.odometry.position_growth in ten seconds: turn "
      "less on the spot, or calibrate the rig (perdure doctor --data)"},
@@ -49,6 +52,11 @@ Doubts doubtsOfFindings(const replay::DataFindings& findings) {
       {"gyro_factor", "the scale of the gyroscope, or the focal length, does not fit"},
       {"imu_bursts", "the inertial samples have stamps of packets"},
       {"imu_saturated", "the IMU is saturated"},
+      {"imu_axis_stuck", "an axis of the IMU keeps one value"},
+      {"imu_gap", "inertial samples are missing"},
+      {"imu_spike", "samples of the IMU are corrupt"},
+      {"gyro_", "gyroscope and images contradict each other"},
+      {"time_offset", "camera and IMU do not agree in time"},
       {"images_flipped", "the images are mirrored or upside down"},
       {"clock_", "stamps pause or jump"},
       {"declared_rates", "sensor rates differ from the declared ones"},

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <fstream>
 #include <sstream>
 
@@ -46,7 +47,8 @@ std::string faultOf(const YAML::Exception& error, const std::string& name,
   std::string line;
   for (int number = 1; std::getline(lines, line); ++number) {
     const auto indent = line.substr(0, line.find_first_not_of(" \t"));
-    if (indent.find('\t') == std::string::npos) continue;
+    const bool near = std::abs(number - 1 - error.mark.line) <= 1;
+    if (!near || indent.find('\t') == std::string::npos) continue;
     return fmt::format("{}:{}: the line is indented with a tab, which YAML forbids; write blanks",
                        name, number);
   }

@@ -14,7 +14,8 @@
 namespace perdure::gateway {
 
 /// Frames of REP-105 and REP-103; a camera's frame is <name>_optical. The odometry's W is `odom`.
-inline constexpr char kMapFrame[] = "map", kOdomFrame[] = "odom", kBodyFrame[] = "base_link";
+inline constexpr char kMapFrame[] = "map", kOdomFrame[] = "odom", kBodyFrame[] = "base_link",
+                      kEarthFrame[] = "enu";
 std::string opticalFrame(const std::string& camera);
 
 /// Writes a time as {"sec", "nsec"}. Times before 1970 become 0.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "common/math/so3.h"
 #include "services/gateway/core/json_writer.h"
 #include "services/gateway/core/pieces.h"
 
@@ -55,11 +56,15 @@ class Cdr {
 }  // namespace
 
 std::string frameTransforms(TimePoint time, const RigidTransform& T_MW, const RigidTransform& T_WB,
-                            const Calibration* calibration) {
+                            const Calibration* calibration, std::optional<double> yaw_from_east) {
   JsonWriter json;
   json.begin('{').key("transforms").begin('[');
   putTransform(json, time, kMapFrame, kOdomFrame, T_MW);
   putTransform(json, time, kOdomFrame, kBodyFrame, T_WB);
+  if (yaw_from_east) {
+    const RigidTransform T_WE{rotationAboutZ(-*yaw_from_east), Eigen::Vector3d::Zero()};
+    putTransform(json, time, kOdomFrame, kEarthFrame, T_WE);
+  }
   if (calibration != nullptr) {
     for (const CameraCalibration& camera : calibration->cameras) {
       putTransform(json, time, kBodyFrame, opticalFrame(camera.name), camera.T_BC);

@@ -1,6 +1,7 @@
 // Geometry for Foxglove: frames, the pose and trajectory of the body, landmarks and cameras.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,9 +10,10 @@
 
 namespace perdure::gateway {
 
-/// Returns the transforms map → odom → base_link → <camera>_optical.
+/// Returns the transforms map → odom → base_link → <camera>_optical, and odom → enu (x east,
+/// y north) if the yaw of the x axis of W from east is known, in rad.
 std::string frameTransforms(TimePoint time, const RigidTransform& T_MW, const RigidTransform& T_WB,
-                            const Calibration* calibration);
+                            const Calibration* calibration, std::optional<double> yaw_from_east);
 std::string poseInFrame(TimePoint time, const RigidTransform& T_WB);
 /// Returns the landmarks as points with x, y, z and sigma as 32-bit floats.
 std::string landmarksAsPoints(const Landmarks& landmarks);

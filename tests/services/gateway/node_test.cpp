@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "tests/services/gateway/objects.h"
@@ -72,6 +73,25 @@ TEST_F(GatewayNode, TellsWhoComesWhatIsKnownAlready) {
   EXPECT_EQ(on(kTransforms).at(0)["transforms"].size(), 3u);
   EXPECT_EQ(on(kHealth).at(0)["vehicle"], "ego");
   EXPECT_EQ(on(cameraChannel(0, kCalibration)).at(0)["K"][0], 400);
+}
+
+TEST_F(GatewayNode, TellsWhereNorthIsAfterASatellitePosition) {
+  Calibration rig = test::forwardCamera();
+  rig.anchor = GeoAnchor{fromNanoseconds(kSecond), 49.0, 8.4, 110.0, 0.5};
+  node_.onCalibration(rig);
+  node_.setWanted({kTransforms});
+  Odometry odometry;
+  odometry.state = OdometryState::kTracking;
+  odometry.T_WB.q = Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitZ());
+  for (std::uint64_t i = 0; i < 2; ++i) {
+    odometry.stamp = grey(i).stamp;
+    node_.onOdometry(odometry, kSecond);
+  }
+  const json earth = on(kTransforms).back()["transforms"][2];
+  EXPECT_EQ(earth["parent_frame_id"], "odom");
+  EXPECT_EQ(earth["child_frame_id"], "enu");
+  // W's x is 0.3 rad north of east.
+  EXPECT_NEAR(2.0 * std::asin(earth["rotation"]["z"].get<double>()), -0.3, 1e-6);
 }
 
 TEST_F(GatewayNode, ShowsImagesAtTheRateThatIsSetAndAsJpeg) {

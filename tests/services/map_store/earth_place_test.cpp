@@ -1,4 +1,4 @@
-#include "services/map_store/earth_place.h"
+#include "common/earth/earth_place.h"
 
 #include <gmock/gmock.h>
 

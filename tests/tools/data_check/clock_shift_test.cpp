@@ -141,6 +141,34 @@ TEST(ClockParts, AStepOfLessThanASecondIsFoundWithItsPlace) {
   EXPECT_TRUE(judged(milliseconds(150), milliseconds(150)).empty());
 }
 
+TEST(ClockParts, TwoStepsOfOneClockAreNoRate) {
+  auto recording = recordingOf(randomTurning(1));
+  auto turns = turnsOf(recording.imu, Duration{0});
+  const auto late = [](TimePoint time) {
+    return (time < kStart + seconds(30)   ? 0
+            : time < kStart + seconds(60) ? 1
+                                          : 2) *
+           milliseconds(80);
+  };
+  for (auto& frame : recording.frames) frame.time += late(frame.time);
+  for (auto& turn : turns) turn.from += late(turn.from), turn.to += late(turn.to);
+  const auto found = judgeParts(offsetsOfParts(turns, recording.imu, camera()), recording);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_THAT(found[0].text, HasSubstr("jump ahead by 0.080 s, at"));
+  EXPECT_THAT(found[0].text, HasSubstr("without these steps"));
+}
+
+TEST(ClockParts, MissingSamplesAreNamedWhileTheImagesGoOn) {
+  auto recording = recordingOf(randomTurning(1));
+  EXPECT_TRUE(checkImuGaps(recording).empty());
+  std::erase_if(recording.imu, [](const ImuSample& sample) {
+    return sample.time > kStart + seconds(30) && sample.time < kStart + milliseconds(30500);
+  });
+  const auto found = checkImuGaps(recording);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_THAT(found[0].text, HasSubstr("no inertial samples for 0.50 s from"));
+}
+
 TEST(ClockParts, AClockThatIsSlightlyFastIsFoundWithItsFactor) {
   const auto recording = recordingOf(randomTurning(2));
   auto turns = turnsOf(recording.imu, Duration{0});

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <opencv2/imgcodecs.hpp>
 #include <random>
 
@@ -52,6 +53,15 @@ TEST(FaultySensors, AnAxisOfTheGyroscopeThatIsOffIsNamed) {
               HasSubstr("w_z is 0.013 rad/s in all 401 samples while the images turn"));
 }
 
+TEST(FaultySensors, AnAxisOfTheGyroscopeWithAnotherScaleIsNamed) {
+  TurningDrive drive;
+  drive.seconds = 6.0;
+  EXPECT_EQ(findingIn(makeTurningDrive("scaled", drive), "gyro_axis_factor"), "none");
+  drive.change = [](ImuSample& sample) { sample.gyro.z() *= 0.5; };
+  EXPECT_THAT(findingIn(makeTurningDrive("scaled", drive), "gyro_axis_factor"),
+              HasSubstr("w_z is 0.5"));
+}
+
 TEST(FaultySensors, ThousandthsOfADegreeAreNoDegrees) {
   TurningDrive drive;
   drive.turning = 0.004;  // a device that is held still
@@ -81,6 +91,47 @@ TEST(FaultySensors, AGyroscopeThatStaysAtItsLargestValueIsSaturated) {
   };
   EXPECT_THAT(findingIn(makeTurningDrive("saturated", drive), "imu_saturated"),
               HasSubstr("the gyroscope reads exactly ±0.2 rad/s about z in"));
+}
+
+/// A drive with noise, whose i-th sample is changed by `change`.
+fs::path noisyDrive(const char* name, const std::function<void(ImuSample&, int)>& change) {
+  std::mt19937_64 random(2);
+  std::normal_distribution<double> noise(0.0, 0.002);
+  TurningDrive drive;
+  drive.seconds = 4.0;
+  int count = 0;
+  drive.change = [&](ImuSample& sample) {
+    for (int i = 0; i < 3; ++i) sample.gyro[i] += noise(random), sample.accel[i] += noise(random);
+    change(sample, count++);
+  };
+  return makeTurningDrive(name, drive);
+}
+
+TEST(FaultySensors, AnAxisThatKeepsOneValueIsStuck) {
+  const auto sound = noisyDrive("not_stuck", [](ImuSample& sample, int i) {
+    if (i >= 100 && i < 150) sample.accel.z() = 9.7;
+  });
+  EXPECT_EQ(findingIn(sound, "imu_axis_stuck"), "none");
+  const auto all = noisyDrive("stuck", [](ImuSample& sample, int) { sample.accel.z() = 9.7; });
+  EXPECT_THAT(findingIn(all, "imu_axis_stuck"),
+              HasSubstr("the accelerometer reads exactly 9.7 m/s² along z from"));
+  const auto half = noisyDrive("stuck_later", [](ImuSample& sample, int i) {
+    if (i >= 400) sample.gyro.x() = 0.0;
+  });
+  EXPECT_THAT(findingIn(half, "imu_axis_stuck"), HasSubstr("cut the drive there"));
+  EXPECT_EQ(findingIn(half, "gyro_axes"), "none");
+}
+
+TEST(FaultySensors, SingleSamplesFarFromTheirNeighboursAreSpikes) {
+  const auto shock = noisyDrive("shock", [](ImuSample& sample, int i) {
+    if (i >= 300 && i < 304) sample.accel.z() += i % 2 == 0 ? 150.0 : -120.0;
+  });
+  EXPECT_EQ(findingIn(shock, "imu_spike"), "none");
+  const auto drive = noisyDrive("spike", [](ImuSample& sample, int i) {
+    if (i == 300 || i == 350) sample.gyro.y() = 1e5;
+  });
+  EXPECT_THAT(findingIn(drive, "imu_spike"), HasSubstr("(and 1 more) reads 1e+05 rad/s about y"));
+  EXPECT_EQ(findingIn(drive, "gyro_scale"), "none");
 }
 
 }  // namespace

@@ -96,6 +96,14 @@ TEST(BoxMotion, OtherAxesAreFound) {
                 return Box{b.y1, b.x1, b.y2, b.x2};
               }),
               HasSubstr("x and y of the boxes are exchanged"));
+  EXPECT_THAT(doubtAfter([](const Box& b) {
+                return Box{240 - b.y2, b.x1, 240 - b.y1, b.x2};
+              }),
+              HasSubstr("write x1 = y1, x2 = y2, y1 = 240 - x2, y2 = 240 - x1"));
+  EXPECT_THAT(doubtAfter([](const Box& b) {
+                return Box{b.y1, 320 - b.x2, b.y2, 320 - b.x1};
+              }),
+              HasSubstr("write x1 = 320 - y2, x2 = 320 - y1, y1 = x1, y2 = x2"));
 }
 
 TEST(BoxMotion, OtherSizesAreFoundWithTheFactor) {
@@ -139,6 +147,28 @@ TEST(BoxMotion, NumbersOfADetectorThatSawEachSecondFrameAreFound) {
   ASSERT_TRUE(doubt);
   EXPECT_EQ(doubt->what, "boxes have wrong frame numbers");
   EXPECT_THAT(doubt->fix, HasSubstr("multiply the numbers by 2"));
+}
+
+/// The fix for boxes whose frame numbers were changed by `change`.
+std::string fixAfter(const std::function<std::int64_t(std::int64_t)>& change) {
+  const Frames sound = drive();
+  Frames changed = sound;
+  for (auto& [number, frame] : changed) frame.detections.clear();
+  for (const auto& [number, frame] : sound) {
+    const std::int64_t other = change(static_cast<std::int64_t>(number));
+    const auto found = changed.find(static_cast<std::uint64_t>(other));
+    if (found != changed.end()) found->second.detections = frame.detections;
+  }
+  const auto doubt = doubtOfBoxes(changed, camera());
+  return doubt ? doubt->what + ": " + doubt->fix : "";
+}
+
+TEST(BoxMotion, ShiftedAndReversedNumbersAreFound) {
+  EXPECT_THAT(fixAfter([](std::int64_t k) { return k + 10; }),
+              HasSubstr("subtract about 10 from the numbers"));
+  EXPECT_THAT(fixAfter([](std::int64_t k) { return k - 5; }),
+              HasSubstr("add about 5 to the numbers"));
+  EXPECT_THAT(fixAfter([](std::int64_t k) { return 239 - k; }), HasSubstr("write 239 - number"));
 }
 
 }  // namespace

@@ -67,7 +67,7 @@ TEST(Doubts, TheLastLineNamesWhatWouldElseBeSilent) {
   vio.add("frame_without_update", 90);
   RunFacts facts{.vio = vio, .frames = 240, .boxes = 70};
   facts.findings.push_back({{}, "clock_set", "set back by 2 s"});
-  facts.findings.push_back({{}, "time_offset", "not of this kind"});
+  facts.findings.push_back({{}, "accel_scale", "not of this kind"});
   EXPECT_EQ(
       endOfLine(doubtsOfRun(facts)),
       " | WARNING: stamps were changed; no image point could be used at 90 of 240 frames; the "

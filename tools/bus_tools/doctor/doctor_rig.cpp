@@ -10,6 +10,7 @@
 #include "tools/bus_tools/doctor/doctor.h"
 #include "tools/calibrate/motion/from_motion.h"
 #include "tools/calibrate/rig_check.h"
+#include "tools/data_check/clock_parts.h"
 #include "tools/data_check/data_check.h"
 #include "tools/data_check/repaired_copy.h"
 #include "tools/data_check/repaired_text.h"
@@ -50,9 +51,10 @@ void checkPosesOf(const Drive& drive, const replay::Recording& recording, Findin
 
 /// Whether vio would only show the consequences of a finding.
 bool isCause(const replay::DataFinding& finding) {
-  constexpr const char* kCauses[] = {"focal_length", "time_offset",    "readout",
-                                     "clock_step",   "clock_rate",     "imu_bursts",
-                                     "imu_repeats",  "images_flipped", "stamps_of_arrival"};
+  constexpr const char* kCauses[] = {
+      "focal_length",   "time_offset", "readout",         "clock_step",     "clock_set_alone",
+      "clock_rate",     "imu_bursts",  "imu_repeats",     "images_flipped", "stamps_of_arrival",
+      "imu_axis_stuck", "imu_spike",   "gyro_axis_factor"};
   return std::ranges::any_of(kCauses, [&](const char* code) { return finding.code == code; });
 }
 
@@ -144,6 +146,11 @@ Findings checkRigBy(const Drive& drive, std::optional<double> seconds) {
     options.vio.stereo = false;
     const auto second = calibrate::judgeSecond(check, calibrate::checkRig(of_vio, options));
     judgements.insert(judgements.begin(), second.begin(), second.end());
+  }
+  const bool good = calibrate::worstOf(judgements) == calibrate::Grade::kGood;
+  if (const auto jumps = suspectJumps(recording); !good && !jumps.empty()) {
+    findings.push_back({Verdict::kWarn, jumps + ": if a clock was set there, this explains what "
+                                                "follows; exclude it first"});
   }
   for (const auto& judgement : judgements) {
     const Verdict verdict = judgement.grade == calibrate::Grade::kGood       ? Verdict::kOk

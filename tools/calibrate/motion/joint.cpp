@@ -83,6 +83,9 @@ class Problem {
   Window advanced(const Window& window, const Reduced<N>& reduced,
                   const Eigen::Matrix<double, N - kOwn, 1>& step, double length) const;
   JointVector sigmaOf(const std::vector<Reduced<kShared>>& all);
+  /// The time offset that explains a window best, with the other parameters of all windows.
+  tools::PartOffset offsetOf(Window window) const;
+  std::vector<tools::PartOffset> offsets() const;
 
   /// Variance of a residual in px²; the priors are weighted relative to it.
   double unit() const { return 0.25 * scale_ * scale_; }
@@ -272,6 +275,47 @@ JointVector Problem::sigmaOf(const std::vector<Reduced<kShared>>& all) {
   return (sandwich.cwiseMax(bound) + of_prior).cwiseSqrt();
 }
 
+/// Scales the deviations by the differences between neighbours, on which a clock has little effect.
+/// Their mean would contain the effect of a clock on the residuals.
+void scaleBySpread(std::vector<tools::PartOffset>& offsets) {
+  constexpr double kLeast = 0.5, kNormal = 0.6745;  // smallest scale; median of a normal deviate
+  std::vector<double> differences;
+  for (std::size_t i = 1; i < offsets.size(); ++i) {
+    const auto &a = offsets[i - 1], &b = offsets[i];
+    differences.push_back(std::abs(a.offset_s - b.offset_s) / std::hypot(a.sigma_s, b.sigma_s));
+  }
+  if (differences.empty()) return;
+  const double scale = std::clamp(medianOf(std::move(differences)) / kNormal, kLeast, 1.0);
+  for (auto& one : offsets) one.sigma_s *= scale;
+}
+
+tools::PartOffset Problem::offsetOf(Window window) const {
+  constexpr int kRounds = 4;
+  JointState state = state_;
+  double information = 0.0;
+  for (int round = 0; round < kRounds; ++round) {
+    settle(state, window);
+    const Joint one = jointOf(reduce<kShared>(state, window, exposuresOf(state, window)));
+    information = one.H(kLater, kLater);
+    state.camera.time_offset_s -= one.g[kLater] / information;
+  }
+  const auto& times = window.tracks->times;
+  return {times.front(), times.back(), state.camera.time_offset_s,
+          std::sqrt(excess_ * unit() / information)};
+}
+
+std::vector<tools::PartOffset> Problem::offsets() const {
+  std::vector<tools::PartOffset> all(windows_.size());
+  cv::parallel_for_(cv::Range(0, static_cast<int>(all.size())), [&](const cv::Range& range) {
+    for (int i = range.start; i < range.end; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      all[k] = offsetOf(windows_[k]);
+    }
+  });
+  scaleBySpread(all);
+  return all;
+}
+
 std::vector<double> Problem::allSquares() const {
   std::vector<double> all;
   for (const Window& window : windows_) {
@@ -314,6 +358,7 @@ JointEstimate Problem::solve() {
   sigmaOf(reduceAll());  // sets the weight of the priors
   descend();
   out.sigma = sigmaOf(reduceAll());
+  out.offsets = offsets();
   out.state = state_;
   out.windows = windows_.size();
   out.residual_px = residual_px_;

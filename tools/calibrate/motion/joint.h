@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tools/calibrate/motion/track_windows.h"
+#include "tools/data_check/clock_parts.h"
 
 namespace perdure::calibrate {
 
@@ -47,6 +48,8 @@ struct JointEstimate {
   double residual_px = 0.0;  ///< robust standard deviation of a residual
   double inliers = 0.0;      ///< share of the residuals below three of these
   std::size_t windows = 0, residuals = 0;
+  /// The time offset of each window, with the other parameters of all windows.
+  std::vector<tools::PartOffset> offsets;
 };
 
 JointEstimate estimateJointly(const std::vector<TrackWindow>& windows,

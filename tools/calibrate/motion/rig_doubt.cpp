@@ -106,6 +106,10 @@ MotionCheck checkMotion(const replay::Recording& recording) {
       "ms, readout {:.1f} ± {:.1f} ms",
       tracks.images, joint.windows, found.fx, 100.0 * s[kFocal], 1e3 * found.time_offset_s,
       1e3 * s[kLater], 1e3 * found.readout_s, 1e3 * s[kReadout]);
+  constexpr double kChange_s = 0.015;
+  if (auto clocks = tools::judgeParts(joint.offsets, recording, kChange_s); !clocks.empty()) {
+    return {clocks, "the motion judges the clocks by " + shown};
+  }
   if (!isSure(joint, 1.0)) {
     return {{}, "the motion is too little to judge the lens and the stamps (" + shown + ")"};
   }

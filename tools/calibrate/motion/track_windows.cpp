@@ -78,7 +78,7 @@ void thin(TrackWindow& window) {
 }
 
 TrackWindow windowOf(const Frames& frames, const Run& run, const CameraCalibration& camera) {
-  constexpr std::uint32_t kColumns = 700;
+  constexpr std::uint32_t kColumns = 600;
   const int factor = replay::reductionFor(camera, kColumns);
   const auto whole = [&](const cv::Point2f& p) {
     return Eigen::Vector2d((p.x + 0.5) * factor - 0.5, (p.y + 0.5) * factor - 0.5);

@@ -115,6 +115,7 @@ connection.on('/objects', (message) => {
   if (model.past === undefined) world?.setObjects(model);
 });
 connection.on('/trajectory', (message) => world?.setWay(message.poses));
+connection.on('/tf', ({ transforms }) => world?.setEarth(transforms.find((t) => t.child_frame_id === 'enu')));
 connection.on('/landmarks', (message) => world?.setPoints(message));
 connection.on('/map', (message) => {
   model.takeMap(message);

@@ -389,14 +389,30 @@ export class World {
     this.resize();
   }
 
-  /** Shows the length of a bar at the target of the view, and the direction of x of M. */
+  /** Takes the transform from W to east, north and up; undefined: not known. */
+  setEarth(transform) {
+    const { z, w } = transform?.rotation ?? {};
+    const north = transform && 2 * Math.atan2(z, w) + Math.PI / 2; // yaw in W
+    if (north === this.north) return;
+    if ((north === undefined) !== (this.north === undefined)) {
+      const name = north === undefined ? 'x of M' : 'N';
+      const words = north === undefined ? 'Direction of x of the map M. North is shown if the drive has satellite positions.' : 'North';
+      this.compass.querySelector('text').textContent = name;
+      this.compass.querySelector('title').textContent = words;
+      this.compass.setAttribute('aria-label', words);
+    }
+    this.north = north;
+    this.dirty = true;
+  }
+
+  /** Shows the length of a bar at the target of the view, and the direction of north or of x of M. */
   drawScale() {
     const metres = 2 * this.orbit.distance * Math.tan((Math.PI * this.camera.fov) / 360), perPixel = metres / this.canvas.clientHeight;
     const length = roundUp(60 * perPixel), words = `${length} m`;
     this.scaleBar.style.width = `${(length / perPixel).toFixed(0)}px`;
     if (this.scaleBar.textContent !== words) this.scaleBar.textContent = words;
-    const x = new THREE.Vector3(1, 0, 0).applyQuaternion(this.map.quaternion);
-    const turn = this.orbit.azimuth + Math.PI - Math.atan2(x.y, x.x); // clockwise from the view's forward direction
+    const x = new THREE.Vector3(1, 0, 0).applyQuaternion(this.map.quaternion), yaw = this.north ?? Math.atan2(x.y, x.x);
+    const turn = this.orbit.azimuth + Math.PI - yaw; // clockwise from the view's forward direction
     this.compass.querySelector('path').setAttribute('transform', `rotate(${((180 * turn) / Math.PI).toFixed(0)})`);
   }
 

@@ -87,11 +87,12 @@ void refuseFolder(const DetectionFileOptions& options) {
   namespace fs = std::filesystem;
   std::error_code error;
   if (!fs::is_directory(options.file, error)) return;
+  constexpr std::uintmax_t kLargest = 1'000'000;  // bytes of the boxes of one image
   std::pair<std::string, std::string> format;
   std::string ending;
   for (const auto& entry : fs::directory_iterator(options.file, error)) {
-    if (!entry.is_regular_file(error) || entry.file_size(error) == 0 || !format.first.empty())
-      continue;
+    const auto size = entry.is_regular_file(error) ? entry.file_size(error) : 0;
+    if (size == 0 || size > kLargest || !format.first.empty()) continue;
     const auto lines = readLines(entry.path(), "it holds boxes");
     if (!lines.empty()) format = formatOf(entry.path(), lines.front().text, options);
     ending = entry.path().extension().string();
@@ -99,7 +100,7 @@ void refuseFolder(const DetectionFileOptions& options) {
   if (format.first.empty()) return;
   throw StartupError(ExitCode::kData,
                      "{} is a folder of {} labels, one file for each image; join them: (echo "
-                     "frame,class,x1,y1,x2,y2,score; awk {} {}/*{}) > boxes.csv{}",
+                     "frame,class,x1,y1,x2,y2,score; awk {} '{}'/*{}) > boxes.csv{}",
                      options.file.c_str(), format.first, format.second, options.file.c_str(),
                      ending,
                      format.first == "YOLO's" ? ", with names in place of the class numbers" : "");

@@ -70,6 +70,19 @@ TEST(MotionJoint, KeepsTheReadoutAtItsPriorWhereNothingTurns) {
   EXPECT_GT(estimated(moving, 1.0).sigma[kReadout], 0.02);
 }
 
+TEST(MotionJoint, FindsTheOffsetOfEachWindow) {
+  auto moving = moveCamera({.truth = phoneWith(480.0, 0.0, 0.0), .windows = 12});
+  for (std::size_t i = 6; i < 12; ++i) {
+    for (TimePoint& time : moving.windows[i].times) time += std::chrono::milliseconds(30);
+  }
+  const auto offsets = estimated(moving, 1.0).offsets;
+  ASSERT_EQ(offsets.size(), 12u);
+  for (std::size_t i = 0; i < 12; ++i) {
+    const double change = offsets[i].offset_s - offsets[0].offset_s;
+    EXPECT_NEAR(change, i < 6 ? 0.0 : -0.03, 0.012) << i;
+  }
+}
+
 /// All rotations that map axes to axes.
 std::vector<Eigen::Matrix3d> mountings() {
   std::vector<Eigen::Matrix3d> all;

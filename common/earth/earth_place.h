@@ -9,7 +9,7 @@
 #include "common/types/odometry.h"
 #include "common/types/sensors.h"
 
-namespace perdure::map_store {
+namespace perdure {
 
 /// Returns "LATITUDE LONGITUDE HEIGHT YAW" of M's origin: degrees (WGS 84), metres above the
 /// ellipsoid, and yaw of M's x axis from east in degrees, as for `perdure map export --anchor` and
@@ -28,6 +28,8 @@ class EarthPlace {
   void onOdometry(const Odometry& odometry);
   /// The time of the newest anchor whose pose is known; nothing if there is none.
   std::optional<TimePoint> known() const;
+  /// Returns the yaw of the x axis of W from east, in rad; nothing if it is not known for `world`.
+  std::optional<double> yawOf(const WorldId& world) const;
   /// Returns earthAnchorOfMap() of that anchor; nothing if its pose is not in `world`, or if `T_MW`
   /// returns nothing.
   std::optional<std::string> ofMap(const WorldId& world, const FrameAt& T_MW) const;
@@ -48,4 +50,4 @@ class EarthPlace {
   std::optional<Known> known_;
 };
 
-}  // namespace perdure::map_store
+}  // namespace perdure

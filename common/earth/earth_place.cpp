@@ -1,4 +1,4 @@
-#include "services/map_store/earth_place.h"
+#include "common/earth/earth_place.h"
 
 #include <fmt/format.h>
 
@@ -6,8 +6,9 @@
 #include <numbers>
 
 #include "common/earth/geodesy.h"
+#include "common/math/so3.h"
 
-namespace perdure::map_store {
+namespace perdure {
 namespace {
 
 constexpr double kLongestGap_s = 1.0;  // longest gap between the poses before and after an anchor
@@ -54,6 +55,11 @@ std::optional<TimePoint> EarthPlace::known() const {
   return known_ ? std::optional(known_->pose.time) : std::nullopt;
 }
 
+std::optional<double> EarthPlace::yawOf(const WorldId& world) const {
+  if (!known_ || known_->pose.world != world) return std::nullopt;
+  return known_->anchor.yaw - perdure::yawOf(known_->pose.T_WB.R());
+}
+
 std::optional<std::string> EarthPlace::ofMap(const WorldId& world, const FrameAt& T_MW) const {
   if (!known_ || known_->pose.world != world) return std::nullopt;
   const auto frame = T_MW(known_->pose.time);
@@ -61,4 +67,4 @@ std::optional<std::string> EarthPlace::ofMap(const WorldId& world, const FrameAt
   return earthAnchorOfMap(known_->anchor, *frame * known_->pose.T_WB);
 }
 
-}  // namespace perdure::map_store
+}  // namespace perdure
