@@ -93,6 +93,10 @@ std::optional<Calibration> CameraNews::take(const Estimator& estimator,
   constexpr double kNoticeable = 0.0025;  // of the width: 0.15 to 0.2° for usual lenses
   const bool approximate = estimator.options().calibration.estimated().lens;
   if (published_.empty() && !approximate && !estimator.mountTurn()) return std::nullopt;
+  constexpr std::chrono::seconds kApart{2};
+  const Duration since = estimator.state().time - time_;
+  const bool soon = !published_.empty() && since >= Duration::zero() && since < kApart;
+  if (soon && !again_) return std::nullopt;
   std::vector<CameraModel> now = estimator.cameras(models);
   const CameraModel& before = published_.empty() ? models[0] : published_[0];
   if (!again_ && largestShift(before, now[0]) < kNoticeable) return std::nullopt;
@@ -104,6 +108,7 @@ std::optional<Calibration> CameraNews::take(const Estimator& estimator,
     }
   }
   published_ = std::move(now);
+  time_ = estimator.state().time;
   return news;
 }
 

@@ -39,7 +39,8 @@ std::vector<double> readouts(const std::vector<CameraModel>& all);
 void useDeviations(const CameraDeviations& rig, CalibrationOptions& options);
 
 /// Selects estimates of the cameras for publication. Only cameras whose lens is estimated, or that
-/// turned on the body, are published, and only if pixels move noticeably.
+/// turned on the body, are published, and only if pixels move noticeably; at most every two
+/// seconds.
 class CameraNews {
  public:
   /// Sets the calibration to which the estimates belong. Published cameras are published again.
@@ -51,6 +52,7 @@ class CameraNews {
  private:
   Calibration given_;
   std::vector<CameraModel> published_;
+  TimePoint time_;  ///< of published_
   bool again_ = false;
 };
 
