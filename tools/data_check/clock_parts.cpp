@@ -338,10 +338,13 @@ replay::DataFindings judgeParts(Parts parts, const replay::Recording& recording,
 
 std::string suspectJumps(const replay::Recording& recording) {
   constexpr double kWhole = 0.15;
-  const double usual = Stamps(framesOf(recording)).usual;
+  Stamps images(framesOf(recording));
+  std::ranges::sort(images.intervals);
+  const double each =
+      images.intervals.empty() ? 1.0 : images.intervals[images.intervals.size() / 8];
   Jumps jumps = jumpsIn(recording);
   std::erase_if(jumps, [&](const Jump& jump) {  // lost images
-    const double times = jump.excess_s / usual;
+    const double times = jump.excess_s / std::max(1e-3, each);
     return !jump.of_imu && std::abs(times - std::round(times)) < kWhole;
   });
   return textOf(jumps, recording.calibration.cameras.front().name);

@@ -147,8 +147,8 @@ Findings checkRigBy(const Drive& drive, std::optional<double> seconds) {
     const auto second = calibrate::judgeSecond(check, calibrate::checkRig(of_vio, options));
     judgements.insert(judgements.begin(), second.begin(), second.end());
   }
-  const bool good = calibrate::worstOf(judgements) == calibrate::Grade::kGood;
-  if (const auto jumps = suspectJumps(recording); !good && !jumps.empty()) {
+  const bool bad = calibrate::worstOf(judgements) == calibrate::Grade::kBad;
+  if (const auto jumps = suspectJumps(recording); bad && !jumps.empty()) {
     findings.push_back({Verdict::kWarn, jumps + ": if a clock was set there, this explains what "
                                                 "follows; exclude it first"});
   }
