@@ -184,7 +184,7 @@ Jumps jumpsIn(const replay::Recording& recording) {
 
 /// The deviations of the parts if each of these jumps is a clock that was set.
 double deviationsAfter(const Parts& parts, const Jumps& set) {
-  constexpr double kEach = 1.0;  // of an assumption
+  constexpr double kEach = 1.0, kInside = 1.0;  // of an assumption, and of a part with a jump in it
   std::vector<double> offsets, sigmas;
   for (const PartOffset& part : parts) {
     double change = 0.0;
@@ -196,8 +196,10 @@ double deviationsAfter(const Parts& parts, const Jumps& set) {
     if (inside) continue;
     offsets.push_back(part.offset_s - change), sigmas.push_back(part.sigma_s);
   }
+  double sum = kEach * static_cast<double>(set.size()) +
+               kInside * static_cast<double>(parts.size() - offsets.size());
+  if (offsets.empty()) return sum;
   const double first = medianOf(std::vector<double>(offsets));
-  double sum = kEach * static_cast<double>(set.size());
   for (std::size_t i = 0; i < offsets.size(); ++i) sum += costOf(offsets[i] - first, sigmas[i]);
   return sum;
 }
@@ -354,10 +356,11 @@ replay::DataFindings checkImuGaps(const replay::Recording& recording) {
   constexpr double kLeast_s = 0.2, kIntervals = 20.0;
   const Stamps imu(recording.imu);
   for (std::size_t i = 0; i < imu.intervals.size(); ++i) {
+    if (imu.intervals[i] < std::max(kLeast_s, kIntervals * imu.usual)) continue;
     const TimePoint from = imu.times[i], to = imu.times[i + 1];
     const bool seen = std::ranges::any_of(
         recording.frames, [&](const auto& frame) { return frame.time > from && frame.time < to; });
-    if (!seen || imu.intervals[i] < std::max(kLeast_s, kIntervals * imu.usual)) continue;
+    if (!seen) continue;
     return {
         {replay::DataFinding::Grade::kWarning, "imu_gap",
          fmt::format("no inertial samples for {:.2f} s from {} ns, while the images go on: they "
