@@ -149,11 +149,15 @@ class SwapRig {
     for (std::uint64_t i = first; i < last; ++i) count += !by_frame_.contains(i);
     return count;
   }
-  /// Returns how many frames arrived while a network was busy. They are lost by its own rate, not
-  /// by the swap. The counts are up to a second old.
+  /// Returns how many frames arrived while a network was busy, or were overwritten before it read
+  /// them. They are lost by its own rate, not by the swap. The counts are up to a second old.
   int droppedByNetworks() const {
     std::uint64_t dropped = 0;
-    for (const auto& [instance, h] : healths_) dropped += h.process == "inference" ? h.dropped : 0;
+    for (const auto& [instance, h] : healths_) {
+      if (h.process != "inference") continue;
+      const auto missed = h.reasons.find("frames_missed");
+      dropped += h.dropped + (missed == h.reasons.end() ? 0 : missed->second);
+    }
     return static_cast<int>(dropped);
   }
   /// Returns the longest time from a frame to its first answer, in periods.
