@@ -70,12 +70,12 @@ class CameraCalibration(Message):
     time_offset_s: float  # s
     readout_s: float  # s
     rate_hz: float  # Hz, nominal
-    focal_sigma: float  # relative, 0: not known
-    centre_sigma_px: float  # px, 0: not known
-    distortion_sigma: float  # 0: not known
-    rotation_sigma: float  # rad, 0: not known
-    position_sigma_m: float  # m, 0: not known
-    time_offset_sigma_s: float  # s, 0: not known
+    focal_sigma: float  # float
+    centre_sigma_px: float  # float
+    distortion_sigma: float  # float
+    rotation_sigma: float  # float
+    position_sigma_m: float  # float
+    time_offset_sigma_s: float  # float
 
 class ImuCalibration(Message):
     gyro_noise: float  # float
