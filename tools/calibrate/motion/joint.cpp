@@ -297,11 +297,12 @@ tools::PartOffset Problem::offsetOf(Window window) const {
     settle(state, window);
     const Joint one = jointOf(reduce<kShared>(state, window, exposuresOf(state, window)));
     information = one.H(kLater, kLater);
+    if (!(information > 0.0)) break;  // nothing turns; the deviation is infinite
     state.camera.time_offset_s -= one.g[kLater] / information;
   }
   const auto& times = window.tracks->times;
   return {times.front(), times.back(), state.camera.time_offset_s,
-          std::sqrt(excess_ * unit() / information)};
+          std::sqrt(excess_ * unit() / std::max(0.0, information))};
 }
 
 std::vector<tools::PartOffset> Problem::offsets() const {
