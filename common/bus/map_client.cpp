@@ -8,7 +8,8 @@ using Clock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
 MapClient::MapClient(const Participant& participant)
-    : questions_(participant, kTopic<MapQuery>),
+    : participant_(participant),
+      questions_(participant, kTopic<MapQuery>),
       answers_(participant, kTopic<MapReply>),
       loop_(participant) {
   loop_.on(answers_, [this](const MapReply& reply) {
@@ -16,10 +17,20 @@ MapClient::MapClient(const Participant& participant)
   });
 }
 
-Result<MapReply> MapClient::ask(MapQuery query, double patience_s) {
+Result<MapReply> MapClient::ask(const MapQuery& query, double patience_s) {
+  return ask(questions_, query, patience_s);
+}
+
+Result<MapReply> MapClient::correct(const Correction& correction, double patience_s) {
+  Writer<MapCorrection> corrections(participant_, kTopic<MapCorrection>);
+  return ask(corrections, {0, 0, correction}, patience_s);
+}
+
+template <class Question>
+Result<MapReply> MapClient::ask(Writer<Question>& questions, Question question, double patience_s) {
   constexpr auto kResend = 500ms;
-  query.client = client_;
-  query.request = ++request_;
+  question.client = client_;
+  question.request = ++request_;
   reply_.reset();
   const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(
                                       std::chrono::duration<double>(patience_s));
@@ -28,9 +39,9 @@ Result<MapReply> MapClient::ask(MapQuery query, double patience_s) {
   while (!reply_) {
     const auto now = Clock::now();
     if (now >= end) return fail(matched ? "no_answer" : "no_map_store");
-    matched = questions_.matched() > 0 && answers_.matched() > 0;
+    matched = questions.matched() > 0 && answers_.matched() > 0;
     if (matched && now >= next_send) {
-      (void)questions_.write(query);
+      (void)questions.write(question);
       next_send = now + kResend;
     }
     loop_.runOnce(20ms);

@@ -1,4 +1,4 @@
-// Sends map queries to the running map_store.
+// Sends map queries and corrections to the running map_store.
 #pragma once
 
 #include <cstdint>
@@ -20,9 +20,14 @@ class MapClient {
   /// Waits until reader and writer are matched, because DDS silently drops earlier requests. Then
   /// repeats the request until a reply arrives. After `patience_s`, fails with "no_map_store" if
   /// nothing matched, else with "no_answer".
-  Result<MapReply> ask(MapQuery query, double patience_s);
+  Result<MapReply> ask(const MapQuery& query, double patience_s);
+  Result<MapReply> correct(const Correction& correction, double patience_s);
 
  private:
+  template <class Question>
+  Result<MapReply> ask(Writer<Question>& questions, Question question, double patience_s);
+
+  const Participant& participant_;
   Writer<MapQuery> questions_;
   Reader<MapReply> answers_;
   WaitLoop loop_;

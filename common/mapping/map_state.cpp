@@ -13,7 +13,7 @@ MapState::MapState(const Parameters& parameters, SavedMap saved)
       graph_(parameters.graph),
       records_(std::move(saved.records)),
       tracks_(std::move(saved.tracks)),
-      identity_(saved.facts),
+      identity_(saved.facts, std::move(saved.corrections)),
       saved_facts_(std::move(saved.facts)),
       views_(std::move(saved.views)) {
   for (std::size_t k = 0; k < saved.classes.size(); ++k) {
@@ -208,6 +208,28 @@ void MapState::unite(const SameObject& fact) {
   regroup(before);
 }
 
+void MapState::put(const Correction& correction) {
+  unsaved_corrections_.push_back(correction);
+  std::vector<Correction> all = identity_.corrections();
+  const auto at = std::ranges::lower_bound(all, correction.id, {}, &Correction::id);
+  if (at != all.end() && at->id == correction.id) {
+    *at = correction;
+  } else {
+    all.insert(at, correction);
+  }
+  Groups before;
+  if (correction.aboutTwo()) before = groupsOf(correction.object, correction.other);
+  std::set<TrackId> alone;
+  for (const auto& [track, object] : before) {
+    if (!identity_.isShared(track)) alone.insert(track);
+  }
+  identity_.setCorrections(std::move(all));
+  std::erase_if(before, [&](const auto& each) {
+    return alone.contains(each.first) && !identity_.isShared(each.first);
+  });
+  regroup(before);
+}
+
 void MapState::endFactsOf(EdgeId loop) {
   Groups before;
   for (const SameObject& fact : identity_.factsOf(loop)) before.merge(groupsOf(fact.a, fact.b));
@@ -302,6 +324,7 @@ Unsaved MapState::unsaved() const {
                       std::inserter(result.changed.facts, result.changed.facts.end()));
   std::set_difference(saved_facts_.begin(), saved_facts_.end(), facts.begin(), facts.end(),
                       std::inserter(result.facts_gone, result.facts_gone.end()));
+  result.changed.corrections = unsaved_corrections_;
   for (const AnchorId id : views_touched_) result.changed.views[id] = views_.at(id);
   return result;
 }
@@ -311,6 +334,7 @@ void MapState::markSaved() {
   tracks_erased_.clear();
   regrouped_.clear();
   saved_facts_ = identity_.facts();
+  unsaved_corrections_.clear();
   views_touched_.clear();
   for (const auto& [id, anchor] : anchors_) {
     saved_anchors_[id] = {graph_.pose(id), anchor.scale};

@@ -60,6 +60,8 @@ class MapState {
 
   const Identity& identity() const { return identity_; }
   void unite(const SameObject& fact);
+  /// Adds a correction, or replaces the one with its id.
+  void put(const Correction& correction);
   /// Moves the facts of a loop closure to another one.
   void replaceLoop(EdgeId loop, EdgeId by) { identity_.replaceLoop(loop, by); }
   /// Tracks whose object id has changed since markSaved(), or that began or ceased to share an
@@ -104,6 +106,7 @@ class MapState {
   std::set<ObjectId> touched_, erased_;
   std::set<TrackId> tracks_touched_, tracks_erased_, regrouped_;
   std::set<SameObject> saved_facts_;
+  std::vector<Correction> unsaved_corrections_;
   std::map<AnchorId, View> views_;
   std::set<AnchorId> views_touched_;
 };

@@ -261,6 +261,11 @@ void Mapper::onGone(TrackId id) {
   loop_search_.forget();
 }
 
+void Mapper::onCorrection(const Correction& correction) {
+  state_.put(correction);
+  if (correction.aboutTwo()) loop_search_.forget();
+}
+
 const Marginals& Mapper::marginals() {
   if (!marginals_) {
     marginals_ = std::make_unique<Marginals>(state_.graph(), builder_.last()->id);

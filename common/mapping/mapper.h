@@ -81,6 +81,8 @@ class Mapper {
   void onMerged(TrackId survivor, TrackId absorbed, bool confirmed = true);
   /// Processes the deletion of a confirmed track by the filter.
   void onGone(TrackId id);
+  /// Adds a correction by a person, or replaces the one with its id, in order to withdraw it.
+  void onCorrection(const Correction& correction);
   /// Visits the anchors of a saved session again, and searches at each for loops with other
   /// sessions, including later ones. Map fusion uses this function. Afterwards the mapper is at the
   /// end of the session.

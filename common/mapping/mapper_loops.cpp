@@ -73,7 +73,8 @@ void Mapper::join(const LoopClosure& loop) {
     const SameObject fact{loop.id, known, seen};
     state_.unite(fact);
     change_.facts.push_back(fact);
-    if (survivor != absorbed) change_.merges.push_back({loop.id, survivor, absorbed});
+    const bool joined = identity.objectOf(known) == identity.objectOf(seen);  // people may object
+    if (survivor != absorbed && joined) change_.merges.push_back({loop.id, survivor, absorbed});
   }
 }
 

@@ -59,7 +59,8 @@ struct SavedMap {
   std::map<ObjectId, ObjectRecord> records;     ///< records by object
   std::map<TrackId, ObjectRecord> tracks = {};  ///< records of tracks that share an object
   std::set<SameObject> facts = {};
-  std::map<AnchorId, View> views = {};  ///< views from anchors with landmarks
+  std::vector<Correction> corrections = {};  ///< by people, sorted by id
+  std::map<AnchorId, View> views = {};       ///< views from anchors with landmarks
 };
 
 struct Unsaved {

@@ -11,14 +11,14 @@ namespace perdure {
 const char* nameOf(ExistenceEvidence kind) {
   static constexpr std::array kNames{"prior",  "hit",   "repeated", "miss",      "screened",
                                      "hidden", "away",  "time",     "misshapen", "lost",
-                                     "shared", "merge", "restore",  "recall"};
+                                     "shared", "merge", "restore",  "recall",    "person"};
   static_assert(kNames.size() == kExistenceEvidences);
   return nameAt(kNames, kind);
 }
 
 const char* nameOf(ClassEvidence kind) {
-  static constexpr std::array kNames{"prior",   "activation", "geometry", "miss",   "motion",
-                                     "pruning", "merge",      "restore",  "context"};
+  static constexpr std::array kNames{"prior",   "activation", "geometry", "miss",    "motion",
+                                     "pruning", "merge",      "restore",  "context", "person"};
   static_assert(kNames.size() == kClassEvidences);
   return nameAt(kNames, kind);
 }

@@ -28,8 +28,9 @@ enum class ExistenceEvidence : std::uint8_t {
   kMerge,             ///< evidence of another track that was merged into this one
   kRestore,           ///< evidence from before this ledger, restored at the restart of a service
   kRecall,            ///< evidence from before this ledger, restored when the object was recalled
+  kPerson,            ///< corrections by people; not a part of the belief that the map stores
 };
-inline constexpr std::size_t kExistenceEvidences = 14;
+inline constexpr std::size_t kExistenceEvidences = 15;
 
 /// Kinds of evidence that change the class probabilities. The values are positions in
 /// ClassLedger::log_odds; new kinds are appended.
@@ -43,8 +44,9 @@ enum class ClassEvidence : std::uint8_t {
   kMerge,       ///< evidence of another track that was merged into this one
   kRestore,     ///< evidence from before this ledger
   kContext,     ///< earlier versions only: objects nearby
+  kPerson,      ///< corrections by people; not a part of the belief that the map stores
 };
-inline constexpr std::size_t kClassEvidences = 9;
+inline constexpr std::size_t kClassEvidences = 10;
 
 const char* nameOf(ExistenceEvidence kind);  ///< "prior", "hit", …
 const char* nameOf(ClassEvidence kind);      ///< "prior", "activation", …

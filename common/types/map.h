@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/math/rigid_transform.h"
+#include "common/types/corrections.h"
 #include "common/types/description.h"
 #include "common/types/objects.h"
 
@@ -149,6 +150,8 @@ struct MapReply {
   std::vector<MapLoop> loops;      ///< for kGraph: loop closures between `anchors`, sorted by id
   /// Total numbers in this M, including those not in this reply; 0: not known.
   std::uint32_t anchor_count = 0, loop_count = 0;
+  /// Standing corrections: of the object for kById, all for kAll.
+  std::vector<Correction> corrections;
 };
 
 /// A track that belongs to an object with another id.
@@ -180,6 +183,9 @@ struct MapNear {
   /// Objects that this client detected in this W and that the graph has not moved, as the client
   /// published them.
   std::vector<ObjectBelief> as_published;
+  /// Standing corrections of objects near the body, except kDifferent. The beliefs above do not
+  /// contain them, and `members` does not contain objects that people joined (kSame).
+  std::vector<Correction> corrections;
 };
 
 }  // namespace perdure
@@ -253,6 +259,7 @@ void describe(auto& a, Is<MapNear> auto& d, auto& w) {
   a.list("members", d.members, w.members, kObjects);
   a.list("placed", d.placed, w.placed, kObjects);
   a.list("as_published", d.as_published, w.as_published, kObjects);
+  a.list("corrections", d.corrections, w.corrections, kMostCorrections);
 }
 
 void describe(auto& a, Is<MapQuery> auto& d, auto& w) {
@@ -313,6 +320,7 @@ void describe(auto& a, Is<MapReply> auto& d, auto& w) {
   a.list("loops", d.loops, w.loops, kReplyAnchors);
   a.value("anchor_count", d.anchor_count, w.anchor_count);
   a.value("loop_count", d.loop_count, w.loop_count);
+  a.list("corrections", d.corrections, w.corrections, kMostCorrections);
 }
 
 }  // namespace perdure::wire

@@ -90,6 +90,8 @@ struct Objects {
   /// The map must send the objects nearer to the body than this, m; 0: none.
   double near_m = 0.0;
   std::vector<EndedTrack> ended;  ///< tracks that ended after MapNear::kept; at most kMostEnded
+  /// The filter's own beliefs of the objects that corrections of people change (corrections.h).
+  std::vector<ObjectBelief> as_estimated;
 };
 inline constexpr std::size_t kMostEnded = 256;
 
@@ -224,6 +226,7 @@ void describe(auto& a, Is<Objects> auto& d, auto& w) {
   a.value("near_revision", d.near_revision, w.near_revision);
   a.number("near_m", d.near_m, w.near_m, kNotNegative);
   a.list("ended", d.ended, w.ended, kMostEnded);
+  a.list("as_estimated", d.as_estimated, w.as_estimated, kObjects);
 }
 
 void describe(auto& a, Is<ObjectState> auto& d, auto& w) {

@@ -13,10 +13,10 @@ enum class Role : std::uint32_t {
   kSemanticFilter = 1u << 3,
   kMapStore = 1u << 4,
   kRecord = 1u << 5,       ///< `perdure record`: reads all topics
-  kOperator = 1u << 6,     ///< the other commands: read all topics, write queries
+  kOperator = 1u << 6,     ///< the other commands: read all topics, write queries and corrections
   kPlayer = 1u << 7,       ///< `perdure play`: writes all topics; created on request only
   kSubscriber = 1u << 8,   ///< third-party programs: read results, write map queries
-  kGateway = 1u << 9,      ///< gateway: reads all topics, writes queries
+  kGateway = 1u << 9,      ///< gateway: reads all topics, writes queries and corrections
   kRos2 = 1u << 10,        ///< the bridge to ROS 2 without inputs: reads all topics
   kRos2Driver = 1u << 11,  ///< the bridge with inputs: also writes their topics; on request only
 };

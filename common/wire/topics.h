@@ -141,6 +141,8 @@ constexpr std::tuple kRows{
                   kSemanticFilter),
     PERDURE_TOPIC(MapQuery, "map/query", reliable(16), kOnChange, kRecorded,
                   kSemanticFilter | kOperator | kSubscriber | kGateway, kMapStore),
+    PERDURE_TOPIC(MapCorrection, "map/correct", reliable(16), kOnChange, kRecorded,
+                  kOperator | kGateway, kMapStore),
     PERDURE_TOPIC(MapReply, "map/reply", reliable(16), kOnChange, kRecorded, kMapStore,
                   kSubscriber),
     PERDURE_TOPIC(Health, "health", latched(1, 1.0), 1.0, kRecorded,

@@ -48,7 +48,10 @@ std::string sentence(ExistenceEvidence kind, const LedgerEntry& entry) {
       "{hypotheses} removed: no longer of the size of their class",
       "{hypotheses} removed: that it drove off unseen",
       "its first box may have been another object's",
-      "merged {times} with an object that was the same"};
+      "merged {times} with an object that was the same",
+      "",
+      "",
+      "stated by people {times}"};
   if (kind == ExistenceEvidence::kRestore) return backFrom("a restart", entry);
   if (kind == ExistenceEvidence::kRecall) return backFrom("the map", entry);
   const std::uint32_t n = entry.count;
@@ -66,7 +69,8 @@ const char* sentence(ClassEvidence kind) {
                                   "hypotheses that were removed",
                                   "merged objects",
                                   "evidence from before this ledger",
-                                  "objects near it"};
+                                  "objects near it",
+                                  "stated by people"};
   return nameAt(kSentences, kind);
 }
 

@@ -143,7 +143,7 @@ std::uint64_t GatewayReplay::logTime(TimePoint time) const {
 std::int64_t GatewayReplay::nowNs() const { return static_cast<std::int64_t>(at_ns_); }
 
 std::unique_ptr<gateway::Node> GatewayReplay::freshNode() {
-  const auto no_store = [this](const MapQuery& query) {
+  const auto no_store = [this](const auto& query) {
     MapReply reply;
     reply.client = query.client;
     reply.request = query.request;
@@ -156,7 +156,8 @@ std::unique_ptr<gateway::Node> GatewayReplay::freshNode() {
       gateway::Outputs{.message = [this](const gateway::Encoded& m) { server_->publish(m); },
                        .time = [this](const TimePoint& t) { server_->tellTime(t); },
                        .answer = [this](const gateway::Answer& a) { server_->answer(a); },
-                       .query = no_store});
+                       .query = no_store,
+                       .correction = no_store});
 }
 
 /// Restores the state at a log time by reading the last seconds before it.

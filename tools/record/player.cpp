@@ -14,7 +14,8 @@ using namespace std::chrono_literals;
 
 /// Topics that are not played by default: they contain queries and answers of processes, or the
 /// state of processes that have ended.
-const std::set<std::string> kNotByItself{"health", "map/query", "map/near", "map/reply"};
+const std::set<std::string> kNotByItself{"health", "map/query", "map/correct", "map/near",
+                                         "map/reply"};
 
 const std::map<std::string, std::set<std::string>> kInputs{
     {"vio", {"calibration", "imu", "speed", "frame/"}},

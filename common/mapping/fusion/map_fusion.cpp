@@ -48,6 +48,7 @@ class Replays {
     SavedMap aligned = map.graph;
     apply(aligned, mapper_.unsaved());
     for (const MergeOrder& order : overlapping(map, aligned, mapper_.graph())) {
+      if (mapper_.identity().areSeparated(order.survivor, order.absorbed)) continue;
       mapper_.onMerged(order.survivor, order.absorbed);
     }
   }
@@ -118,6 +119,10 @@ FusionReport fuseInto(MapContents& map, const MapContents& other, const Paramete
   const auto gone = endWhatIsGone(map);
   report.changes.insert(report.changes.end(), gone.begin(), gone.end());
   map.changes.insert(map.changes.end(), report.changes.begin(), report.changes.end());
+  for (Correction& correction : map.graph.corrections) {
+    correction.object = survivorOf(map, correction.object);
+    correction.other = survivorOf(map, correction.other);
+  }
   return report;
 }
 

@@ -25,6 +25,7 @@ class Uniting {
     for (const auto& [theirs, object] : other_.objects) tellIfNew(theirs);
     for (const auto& [theirs, object] : other_.objects) renew(theirs, object);
     addChanges();
+    addCorrections();
     map_.origins = ours_.told();
     return std::move(addition_);
   }
@@ -147,6 +148,31 @@ class Uniting {
       if (std::none_of(map_.changes.begin(), map_.changes.end(), same)) {
         map_.changes.push_back(change);
       }
+    }
+  }
+
+  /// Adds the corrections, with new ids. A correction that both maps have stays withdrawn if one of
+  /// them withdrew it.
+  void addCorrections() {
+    std::vector<Correction>& ours = map_.graph.corrections;
+    const auto ofOurs = [&](ObjectId theirs) {
+      const auto at = id_of_.find(theirs);
+      return at == id_of_.end() ? theirs : at->second;
+    };
+    for (Correction each : other_.graph.corrections) {
+      each.object = ofOurs(each.object);
+      each.other = ofOurs(each.other);
+      const auto known = std::ranges::find_if(ours, [&](Correction one) {
+        one.id = each.id;
+        one.withdrawn = each.withdrawn;
+        return one == each;
+      });
+      if (known != ours.end()) {
+        known->withdrawn = known->withdrawn || each.withdrawn;
+        continue;
+      }
+      each.id = ours.empty() ? 1 : ours.back().id + 1;
+      ours.push_back(std::move(each));
     }
   }
 

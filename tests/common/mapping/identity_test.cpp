@@ -9,6 +9,7 @@
 
 #include "common/mapping/map_state.h"
 #include "tests/common/mapping/synthetic_drive.h"
+#include "tests/support/corrections.h"
 
 namespace perdure::mapping {
 namespace {
@@ -54,6 +55,47 @@ void forSeeds(const Test& test) {
     std::mt19937 random(seed);
     test(random, seed);
   }
+}
+
+TEST(Identity, PeopleJoinObjectsThatTheFilterDoesNotFuse) {
+  Identity identity({{3, 5, 6}});
+  identity.setCorrections({perdure::test::ofTwo(CorrectionKind::kSame, 5, 2, 10.0)});
+  EXPECT_EQ(identity.objectOf(6), 2u);
+  EXPECT_EQ(identity.observedObjectOf(6), 5u);
+  EXPECT_EQ(identity.observedObjectOf(2), 2u);
+  Correction withdrawn = perdure::test::ofTwo(CorrectionKind::kSame, 5, 2, 10.0);
+  withdrawn.withdrawn = true;
+  identity.setCorrections({withdrawn});
+  EXPECT_EQ(identity.objectOf(6), 5u);
+  EXPECT_FALSE(identity.isShared(2));
+}
+
+TEST(Identity, TheStrongerEvidenceDecidesWhetherTwoTracksAreOne) {
+  Identity identity({{3, 5, 6}, {4, 6, 7}});
+  identity.setCorrections({perdure::test::ofTwo(CorrectionKind::kDifferent, 5, 7, 7.9)});
+  EXPECT_EQ(identity.objectOf(7), 5u);  // a loop has 8 nats
+  identity.setCorrections({perdure::test::ofTwo(CorrectionKind::kDifferent, 7, 5, 8.1)});
+  EXPECT_EQ(identity.objectOf(6), 5u);
+  EXPECT_EQ(identity.objectOf(7), 7u);
+  EXPECT_FALSE(identity.isShared(7));
+  // A second person contradicts the first one.
+  identity.setCorrections({perdure::test::ofTwo(CorrectionKind::kDifferent, 7, 5, 8.1),
+                           perdure::test::ofTwo(CorrectionKind::kSame, 7, 5, 8.1, 2)});
+  EXPECT_EQ(identity.objectOf(7), 5u);
+}
+
+TEST(Identity, AMergeByTheFilterOutweighsPeople) {
+  Identity identity({{0, 5, 6}});
+  identity.setCorrections({perdure::test::ofTwo(CorrectionKind::kDifferent, 5, 6, 50.0)});
+  EXPECT_EQ(identity.objectOf(6), 5u);
+}
+
+TEST(Identity, ALoopThatPeopleContradictDoesNotJoinLater) {
+  Identity identity;
+  identity.setCorrections({perdure::test::ofTwo(CorrectionKind::kDifferent, 5, 6, 10.0)});
+  identity.add({9, 5, 6});
+  EXPECT_FALSE(identity.isShared(5));
+  EXPECT_EQ(identity.factsOf(9).size(), 1u);
 }
 
 TEST(Identity, TheSameFactsInAnyOrderGiveTheSameObjects) {

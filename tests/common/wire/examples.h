@@ -205,7 +205,8 @@ class Examples {
          bits(),
          bits(),
          uniform(0, 99),
-         several([&] { return endedTrack(); })};
+         several([&] { return endedTrack(); }),
+         several([&] { return belief(); })};
   }
   EndedTrack endedTrack() {
     const TrackId into = coin() ? 1 + below(99) : 0;
@@ -294,8 +295,17 @@ class Examples {
          coin(),
          several([&] { return member(); }),
          several([&] { return belief(); }),
-         several([&] { return belief(); })};
+         several([&] { return belief(); }),
+         several([&] { return correction(); })};
   }
+  Correction correction() {
+    return {bits(), static_cast<CorrectionKind>(below(4)),
+            bits(), bits(),
+            word(), uniform(0, 9),
+            word(), time(),
+            coin()};
+  }
+  void fill(MapCorrection& m) { m = {bits(), bits(), correction()}; }
   void fill(MapQuery& m) {
     m = {bits(),
          bits(),
@@ -320,7 +330,8 @@ class Examples {
          several([&] { return mapAnchor(); }),
          several([&] { return mapLoop(); }),
          below(99),
-         below(99)};
+         below(99),
+         several([&] { return correction(); })};
   }
   void fill(SwapNotice& m) {
     m = {bits(), bits(), SwapStep::kRolledBack, uniform(0, 99), word(), word(), word()};

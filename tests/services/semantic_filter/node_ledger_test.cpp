@@ -28,9 +28,9 @@ struct Met {
 
 void expectSumsOf(const ObjectBelief& o, Met& met) {
   ++met.beliefs;
-  ASSERT_EQ(o.why.existence.size(), kExistenceEvidences);
+  ASSERT_EQ(o.why.existence.size(), kOwnExistence);
   ASSERT_NEAR(o.why.logOdds(), std::log(o.existence / (1.0 - o.existence)), kTolerance);
-  for (std::size_t i = 0; i < kExistenceEvidences; ++i) {
+  for (std::size_t i = 0; i < kOwnExistence; ++i) {
     const LedgerEntry& entry = o.why.existence[i];
     ASSERT_LE(entry.first, entry.last);
     if (entry.count > 0) met.existence.insert(nameOf(static_cast<ExistenceEvidence>(i)));
@@ -40,9 +40,9 @@ void expectSumsOf(const ObjectBelief& o, Met& met) {
     const auto row = std::find_if(o.why.classes.begin(), o.why.classes.end(),
                                   [&](const auto& r) { return r.name == c.name; });
     ASSERT_NE(row, o.why.classes.end());
-    ASSERT_EQ(row->log_odds.size(), kClassEvidences);
+    ASSERT_EQ(row->log_odds.size(), kOwnClass);
     double sum = 0.0;
-    for (std::size_t i = 0; i < kClassEvidences; ++i) {
+    for (std::size_t i = 0; i < kOwnClass; ++i) {
       sum += row->log_odds[i];
       if (row->log_odds[i] != 0.0) met.classes.insert(nameOf(static_cast<ClassEvidence>(i)));
     }
@@ -181,11 +181,11 @@ TEST(NodeLedger, SumsAreTheBeliefInEveryFrame) {
   }
   EXPECT_GT(met.beliefs, 5000U);
   // If a cause did not occur in any run, the test proves nothing about it.
-  for (std::size_t i = 0; i < kExistenceEvidences; ++i) {
+  for (std::size_t i = 0; i < kOwnExistence; ++i) {
     const char* name = nameOf(static_cast<ExistenceEvidence>(i));
     EXPECT_TRUE(met.existence.contains(name)) << name;
   }
-  for (std::size_t i = 0; i < kClassEvidences; ++i) {
+  for (std::size_t i = 0; i < kOwnClass; ++i) {
     // Only earlier versions have this cause.
     if (static_cast<ClassEvidence>(i) == ClassEvidence::kContext) continue;
     const char* name = nameOf(static_cast<ClassEvidence>(i));

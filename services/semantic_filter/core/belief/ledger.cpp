@@ -89,7 +89,7 @@ void ClassAccount::oust(const ClassNumbers& pmf, TimePoint at) {
     const double behind = sumOf(winner) - sumOf(row.nats);
     if (ousted_ && ousted_->by == best->name && sumOf(ousted_->nats) <= behind) continue;
     ousted_ = {row.name, best->name, at, {}};
-    for (std::size_t i = 0; i < kClassEvidences; ++i) ousted_->nats[i] = winner[i] - row.nats[i];
+    for (std::size_t i = 0; i < kOwnClass; ++i) ousted_->nats[i] = winner[i] - row.nats[i];
   }
   std::erase_if(rows_.write(), [&](const Row& row) { return !find(pmf, row.name); });
 }

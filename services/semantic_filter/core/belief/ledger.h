@@ -15,6 +15,10 @@
 
 namespace perdure::semantic_filter {
 
+/// Number of the kinds that the filter uses: corrections of people are not a part of its beliefs.
+inline constexpr auto kOwnExistence = static_cast<std::size_t>(ExistenceEvidence::kPerson);
+inline constexpr auto kOwnClass = static_cast<std::size_t>(ClassEvidence::kPerson);
+
 /// Probability that the object exists, with its reasons. Initially it is 1/2.
 class Existence {
  public:
@@ -33,11 +37,11 @@ class Existence {
   const LedgerEntry& of(ExistenceEvidence why) const {
     return entries_[static_cast<std::size_t>(why)];
   }
-  const std::array<LedgerEntry, kExistenceEvidences>& entries() const { return entries_; }
+  const std::array<LedgerEntry, kOwnExistence>& entries() const { return entries_; }
 
  private:
   double r_ = 0.5;
-  std::array<LedgerEntry, kExistenceEvidences> entries_{};
+  std::array<LedgerEntry, kOwnExistence> entries_{};
 };
 
 /// A number for one class of a track.
@@ -65,7 +69,7 @@ class ClassAccount {
   void publish(Ledger& to) const;
 
  private:
-  using Nats = std::array<double, kClassEvidences>;
+  using Nats = std::array<double, kOwnClass>;
   struct Row {
     std::string name;
     Nats nats{};
