@@ -49,6 +49,11 @@ void describe(Config& c, config::Fields& fields) {
                 {"smallest log-likelihood ratio of a loop to its best alternative, if the standard "
                  "deviation of the body's position is above 1.6 m",
                  "nats"});
+  fields.number("corrections.nats", c.correction_nats, config::between(0.5, 50.0),
+                {"log-likelihood ratio of a person's correction that states none; exceeds the "
+                 "filter's largest "
+                 "log-odds of existence (6.9) and a loop (8)",
+                 "nats"});
 }
 
 }  // namespace perdure::map_store

@@ -22,6 +22,7 @@ struct Config {
   std::int64_t cached_replies = 64;
   bool graph = true;  ///< anchors, pose graph and loops
   mapping::Parameters mapping;
+  double correction_nats = 10.0;  ///< of a correction by a person that does not state its own
 };
 
 void describe(Config& config, config::Fields& fields);

@@ -79,6 +79,7 @@ void serve(service::Context& context, const map_store::Config& config) {
     node.onObjects(objects);
   });
   context.on(bus::kTopic<MapQuery>, [&](const MapQuery& query) { node.onQuery(query); });
+  context.on(bus::kTopic<MapCorrection>, [&](const MapCorrection& m) { node.onCorrection(m); });
   FleetServer server(config);
   context.every(std::chrono::milliseconds(50), [&, commits = std::uint64_t{0}]() mutable {
     node.tick(std::chrono::steady_clock::now().time_since_epoch());

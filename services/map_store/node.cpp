@@ -44,7 +44,14 @@ std::string faultOf(const MapQuery& query) {
 
 namespace {
 
+/// Returns the working set by tracks, as the filter estimates it without the corrections of people.
 Objects byTrack(Objects objects) {
+  for (ObjectBelief& own : objects.as_estimated) {
+    const auto at = std::ranges::find(objects.objects, own.trackId(), &ObjectBelief::trackId);
+    at == objects.objects.end() ? objects.objects.push_back(std::move(own))
+                                : void(*at = std::move(own));
+  }
+  objects.as_estimated.clear();
   for (ObjectBelief& belief : objects.objects) {
     belief.id = belief.trackId();
     belief.track = 0;
@@ -89,6 +96,7 @@ Node::Node(const Config& config, InstanceId instance, Outputs outputs)
   if (next_id_ > 1) next_id_ += kIdReserve;
   if (config_.graph) loadGraph();
   if (!graph_) loadFacts();
+  publishCorrections();
   earth_stored_ = graph_ && !database_.reader().earthAnchor().value_or("").empty();
   (void)loadView();
 }
@@ -221,9 +229,12 @@ void Node::commit() {
   left_.clear();
   removed_.clear();
   ++commits_;
-  header_stale_ = header_stale_ || written->revision != revision_;
+  header_stale_ = header_stale_ || written->revision != revision_ || !corrected_.empty();
   revision_ = written->revision;
-  followView(written->objects);
+  publishCorrections();
+  corrected_.insert(written->objects.begin(), written->objects.end());
+  followView({corrected_.begin(), corrected_.end()});
+  corrected_.clear();
   sendNear();
 }
 
@@ -240,16 +251,16 @@ void Node::onQuery(const MapQuery& query) {
   replies_.keep(std::move(reply));
 }
 
-MapReply Node::emptyReply(const MapQuery& query) const {
+MapReply Node::emptyReply(InstanceId client, std::uint64_t request) const {
   MapReply reply;
-  reply.client = query.client;
-  reply.request = query.request;
+  reply.client = client;
+  reply.request = request;
   reply.instance = instance_;
   return reply;
 }
 
 MapReply Node::answer(const MapQuery& query) {
-  MapReply reply = emptyReply(query);
+  MapReply reply = emptyReply(query.client, query.request);
   reply.error = faultOf(query);
   if (reply.error.empty()) {
     auto found = find(query);
@@ -258,6 +269,7 @@ MapReply Node::answer(const MapQuery& query) {
       reply.truncated = found->truncated;
       reply.objects = std::move(found->objects);
       reply.beliefs = std::move(found->beliefs);
+      reply.corrections = std::move(found->corrections);
       return reply;
     }
     blame(found.error());

@@ -60,6 +60,8 @@ class Node {
   }
   void onLandmarks(const Landmarks& landmarks);
   void onQuery(const MapQuery& query);
+  /// Takes a correction by a person, or withdraws one. The reply is sent after the commit.
+  void onCorrection(const MapCorrection& request);
   /// Commits and publishes changes that are due. `now` is a monotonic time with any origin. Call it
   /// at least ten times a second.
   void tick(Duration now);
@@ -96,8 +98,15 @@ class Node {
   std::string camerasText() const;
   void commit();
   MapReply answer(const MapQuery& query);
-  MapReply emptyReply(const MapQuery& query) const;
+  MapReply emptyReply(InstanceId client, std::uint64_t request) const;
   void answerGraph(const MapQuery& query);  ///< in node_graph.cpp
+  // These are in node_corrections.cpp.
+  bool isKnown(ObjectId id);
+  std::string faultOfPair(const Correction& correction) const;
+  std::string faultOfNew(const Correction& correction);
+  std::string completed(Correction& correction);
+  void publishCorrections();
+  void addCorrections(MapNear& near) const;
   // These are in node_view.cpp.
   bool loadView();
   void followView(const std::vector<ObjectId>& changed);
@@ -126,8 +135,9 @@ class Node {
   std::optional<Calibration> cameras_;  ///< a calibration that is not stored yet
   bool earth_stored_ = false;  ///< an earlier process stored the position; it is not overwritten
   std::optional<std::pair<std::uint64_t, TimePoint>>
-      told_earth_;      ///< revision of the graph and earth_.known() at the last write
-  bool graph_ = false;  ///< whether the graph is enabled and its stored state was read
+      told_earth_;                ///< revision of the graph and earth_.known() at the last write
+  std::set<ObjectId> corrected_;  ///< objects with corrections since the last commit
+  bool graph_ = false;            ///< whether the graph is enabled and its stored state was read
   ReplyCache replies_;
   TileBook tiles_;
   MapInM view_;                      ///< objects in M as of the last commit

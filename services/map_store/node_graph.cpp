@@ -54,6 +54,7 @@ void Node::loadFacts() {
   if (!facts) return blame(facts.error());
   mapping::SavedMap map;
   map.facts = *std::move(facts);
+  map.corrections = database_.reader().corrections().value_or(map.corrections);
   mapper_ = mapping::Mapper(config_.mapping, std::move(map));
 }
 
@@ -160,7 +161,7 @@ void Node::reportFrame() {
 /// Answers with the current state, even if the request is repeated. The reply is therefore not
 /// stored in the cache.
 void Node::answerGraph(const MapQuery& query) {
-  MapReply reply = emptyReply(query);
+  MapReply reply = emptyReply(query.client, query.request);
   reply.error = faultOf(query);
   if (reply.error.empty() && !graph_) {
     reply.error = "the map has no graph; set graph.enabled of map_store, and look at its Health";

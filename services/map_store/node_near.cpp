@@ -29,7 +29,7 @@ std::uint64_t digestOf(const std::vector<ObjectBelief>& beliefs) {
 bool sameContent(const MapNear& a, const MapNear& b) {
   return a.client == b.client && a.world == b.world && a.kept == b.kept &&
          a.corrects_drift == b.corrects_drift && a.more == b.more && a.members == b.members &&
-         digestOf(a.placed) == digestOf(b.placed) &&
+         a.corrections == b.corrections && digestOf(a.placed) == digestOf(b.placed) &&
          digestOf(a.as_published) == digestOf(b.as_published);
 }
 
@@ -56,8 +56,8 @@ void Node::sendNear() {
 void Node::publish(MapNear near) {
   const mapping::Identity& identity = mapper_.identity();
   const auto addMember = [&](TrackId track) {
-    if (identity.objectOf(track) != track)
-      near.members.push_back({track, identity.objectOf(track)});
+    if (identity.observedObjectOf(track) != track)
+      near.members.push_back({track, identity.observedObjectOf(track)});
   };
   if (newest_ && newest_->instance == near.client) {
     for (const ObjectBelief& belief : newest_->objects) addMember(belief.id);
@@ -65,10 +65,11 @@ void Node::publish(MapNear near) {
   for (auto* list : {&near.placed, &near.as_published}) {
     for (ObjectBelief& belief : *list) {
       belief.track = belief.id;
-      belief.id = identity.objectOf(belief.track);
+      belief.id = identity.observedObjectOf(belief.track);
       addMember(belief.track);
     }
   }
+  addCorrections(near);
   if (near_ && sameContent(near, *near_)) return;
   near.revision = ++near_revision_;
   for (const ObjectBelief& belief : near.placed) {

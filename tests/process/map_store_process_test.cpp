@@ -13,6 +13,7 @@
 #include "common/bus/wait_loop.h"
 #include "tests/process/support.h"
 #include "tests/services/map_store/beliefs.h"
+#include "tests/support/corrections.h"
 
 namespace perdure::test {
 namespace {
@@ -92,6 +93,31 @@ TEST_F(MapStoreProcess, GivesTheWorkingSetBackToAFilterThatAsks) {
   ASSERT_EQ(answer->placed.size(), 3u);
   EXPECT_EQ(answer->placed[2].best().mean, frame(1, 3).objects[2].best().mean);
   EXPECT_EQ(answer->placed[2].why, frame(1, 3).objects[2].why);
+}
+
+TEST_F(MapStoreProcess, ACorrectionStandsAfterItIsKilledUntilItIsWithdrawn) {
+  bus::MapClient map(participant_);
+  MapQuery one;
+  one.kind = MapQueryKind::kById;
+  one.object_id = 2;
+  const auto existence = [&] {
+    const auto reply = map.ask(one, 10.0);
+    return reply && !reply->objects.empty() ? reply->objects[0].existence : -1.0;
+  };
+  const auto first = start();
+  ASSERT_TRUE(objects_.write(frame(1, 3)).has_value());
+  ASSERT_TRUE(eventually(5s, [&] { return objectsOnTheMap() == 3; }));
+  const double before = existence();
+  const auto made = map.correct(notThere(2), 10.0);
+  ASSERT_TRUE(made && made->ok) << first->log();
+  first->signal(SIGKILL);
+  ASSERT_EQ(first->wait(5s), 128 + SIGKILL);
+  ASSERT_TRUE(eventually(15s, [&] { return objects_.matched() == 0; }));
+  const auto second = start();
+  EXPECT_LT(existence(), 0.01) << second->log();
+  const auto withdrawn = map.correct(withdrawal(made->corrections.at(0).id), 10.0);
+  ASSERT_TRUE(withdrawn && withdrawn->ok) << second->log();
+  EXPECT_EQ(existence(), before);
 }
 
 TEST_F(MapStoreProcess, GivesBackWhatLeftTheWorkingSetAndSaysThatItHasIt) {

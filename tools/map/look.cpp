@@ -60,10 +60,13 @@ nlohmann::ordered_json toJson(const semantic_filter::Fall& fall) {
 MapToLook readMapToLook(const std::string& path) {
   const auto connection = map_store::openStoreForReading(path);
   need(path, connection.execute("BEGIN").map([] { return true; }));
-  const map_store::MapReader reader(&connection);
-  const auto working = need(path, reader.working());
-  const auto graph = need(path, reader.graph());
+  const auto graph = need(path, map_store::MapReader(&connection).graph());
   const mapping::MapState state({}, graph.map);
+  const mapping::Identity& identity = state.identity();
+  const CorrectionsOf corrections =
+      standingByObject(identity.corrections(), [&](ObjectId id) { return identity.objectOf(id); });
+  const map_store::MapReader reader(&connection, &corrections);
+  const auto working = need(path, reader.working());
   const mapping::MapFrames frames(state);
   const WorldId M = frames.mapOf(working ? working->world : WorldId{});
   MapToLook map;

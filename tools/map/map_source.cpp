@@ -29,7 +29,12 @@ map_store::Connection openAtOneState(const std::string& path) {
 MapFile::MapFile(std::string path)
     : path_(std::move(path)),
       connection_(openAtOneState(path_)),
-      working_(reader_.working().value_or(std::nullopt)) {}
+      working_(reader_.working().value_or(std::nullopt)) {
+  const auto corrections = read(path_, reader_.corrections());
+  if (corrections.empty()) return;
+  const mapping::Identity identity(saved().facts, corrections);
+  corrections_ = standingByObject(corrections, [&](ObjectId id) { return identity.objectOf(id); });
+}
 
 const mapping::SavedMap& MapFile::saved() const {
   if (!saved_) saved_ = read(path_, reader_.graph()).map;
@@ -60,6 +65,7 @@ MapReply MapFile::ask(const MapQuery& query, MapFrameChoice frame) {
   reply.truncated = found.truncated;
   reply.objects = std::move(found.objects);
   reply.beliefs = std::move(found.beliefs);
+  reply.corrections = std::move(found.corrections);
   return reply;
 }
 

@@ -49,7 +49,8 @@ class MapFile {
 
   std::string path_;
   map_store::Connection connection_;
-  map_store::MapReader reader_{&connection_};
+  CorrectionsOf corrections_;
+  map_store::MapReader reader_{&connection_, &corrections_};
   std::optional<Objects> working_;                  ///< the last stored working set
   mutable std::optional<mapping::SavedMap> saved_;  ///< the graph, once it was needed
   std::optional<map_store::MapInM> view_;

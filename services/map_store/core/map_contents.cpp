@@ -121,6 +121,10 @@ WholeMap readWhole(const Connection& connection) {
     if (record.earlier) record.earlier->in_anchor.id = id;
   }
   readObjects(connection, map);
+  for (Correction& correction : map.contents.graph.corrections) {
+    correction.object = survivorOf(map.contents, correction.object);
+    correction.other = survivorOf(map.contents, correction.other);
+  }
   readProvenance(connection, map.contents);
   readChanges(connection, map.contents);
   readMeta(connection, map);
@@ -135,7 +139,7 @@ WholeMap readWhole(const Connection& connection) {
 Batch wholeBatch(const WholeMap& map, const Objects& working, const mapping::Unsaved& graph) {
   Batch batch;
   batch.working = &working;
-  batch.graph = &graph;
+  batch.graph = batch.facts = &graph;
   batch.earth_anchor = map.earth_anchor;
   batch.cameras = map.cameras;
   for (const auto& [id, object] : map.contents.objects) {

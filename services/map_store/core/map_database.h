@@ -8,6 +8,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "common/base/result.h"
@@ -69,6 +70,7 @@ struct Written {
 struct Found {
   std::vector<MapObject> objects;
   std::vector<ObjectBelief> beliefs;  ///< the objects in full, for kById and inFullNear
+  std::vector<Correction> corrections;  ///< standing: of the object for kById, all for kAll
   bool truncated = false;
   std::uint64_t malformed = 0;  ///< rows that were left out because their belief could not be read
 };
@@ -93,17 +95,20 @@ MapObject mapObjectOf(const ObjectBelief& belief, const WorldId& world);
 /// Answers queries about a map file. A spatial query searches one frame of reference.
 class MapReader {
  public:
-  explicit MapReader(const Connection* connection) : connection_(connection) {}
+  /// Answers contain `corrections`, if it is not null. It must outlive the reader.
+  explicit MapReader(const Connection* connection, const CorrectionsOf* corrections = nullptr)
+      : connection_(connection), corrections_(corrections) {}
 
   /// Answers kById, kByClass, kByRadius (nearest first), kByBox and kAll (by id) with at most
   /// `limit` objects. kByRadius and kByBox search in query.world, or in `newest` if it is 0.
   Result<Found> find(const MapQuery& query, const WorldId& newest, std::uint32_t limit) const;
   /// All objects on the map, in full, by id; rows that cannot be read are left out.
   Result<std::vector<PlacedBelief>> beliefs() const;
-  /// The objects of `world` within `radius` of `centre`, in full, nearest first; at most `limit`.
+  /// The objects of `world` within `radius` of `centre`, in full and as stored, nearest first; at
+  /// most `limit`.
   Result<Found> inFullNear(const Eigen::Vector3d& centre, double radius, const WorldId& world,
                            std::uint32_t limit) const;
-  /// The last belief of a track; nothing if it is not on the map.
+  /// The last belief of a track, as stored; nothing if it is not on the map.
   Result<std::optional<PlacedBelief>> beliefOf(TrackId track) const;
   /// Those of the objects `ids` that are on the map, in the order of `ids`; at most `limit`.
   Result<Found> byIds(const std::vector<ObjectId>& ids, std::size_t limit) const;
@@ -120,6 +125,9 @@ class MapReader {
   /// The pose graph of the last commit; empty if the map has none.
   Result<SavedGraph> graph() const { return readGraph(*connection_); }
   Result<std::set<mapping::SameObject>> facts() const { return readFacts(*connection_); }
+  Result<std::vector<Correction>> corrections() const { return readCorrections(*connection_); }
+  /// The names of all classes that objects of the map ever had.
+  Result<std::set<std::string>> classes() const;
   /// The `world` numbers of the map's objects.
   Result<std::set<std::uint64_t>> worlds() const;
   /// The position of M on Earth, as earthAnchorOfMap() writes it; empty if not known.
@@ -131,8 +139,12 @@ class MapReader {
 
  private:
   Result<std::string> meta(std::string_view key) const;
+  Result<Found> collect(Statement& statement, std::size_t limit, const MapQuery& query = {}) const;
+  Result<Statement> statementFor(const MapQuery& query, const WorldId& world) const;
+  std::vector<Correction> correctionsFor(const MapQuery& query) const;
 
   const Connection* connection_;
+  const CorrectionsOf* corrections_ = nullptr;
 };
 
 class MapDatabase {
@@ -147,7 +159,9 @@ class MapDatabase {
   /// deletes their rows, because their ids are reused.
   Result<SavedGraph> takeGraph();
 
-  MapReader reader() const { return MapReader(&connection_); }
+  MapReader reader() const { return MapReader(&connection_, &corrections_); }
+  /// Sets the corrections for the answers of readers.
+  void setCorrections(CorrectionsOf corrections) { corrections_ = std::move(corrections); }
   const std::string& notice() const { return notice_; }
 
  private:
@@ -181,6 +195,7 @@ class MapDatabase {
   void remember(const Objects& working, const Change& change);
 
   Connection connection_;
+  CorrectionsOf corrections_;
   std::string notice_;
   double tile_size_m_;
   /// Rows of the working set's confirmed tracks, as committed.

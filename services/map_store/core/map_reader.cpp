@@ -31,28 +31,6 @@ StoredPlace placeFrom(const Statement& row) {
           fromNanoseconds(row.integer(6))};
 }
 
-/// Reads at most `limit` rows. Reads one more row to set `truncated`.
-Result<Found> collect(Statement& statement, std::size_t limit, bool in_full = false) {
-  Found found;
-  for (;;) {
-    const auto row = statement.step();
-    if (!row) return tl::unexpected<Reason>(row.error());
-    if (!*row) return found;
-    if (found.objects.size() == limit) {
-      found.truncated = true;
-      statement.reset();
-      return found;
-    }
-    auto placed = beliefFrom(statement);
-    if (placed) {
-      found.objects.push_back(mapObjectOf(placed->belief, placed->world));
-      if (in_full) found.beliefs.push_back(std::move(placed->belief));
-    } else {
-      ++found.malformed;
-    }
-  }
-}
-
 void bindBox(Statement& statement, const Eigen::Vector3d& low, const Eigen::Vector3d& high,
              const WorldId& world) {
   for (int axis = 0; axis < 3; ++axis) {
@@ -85,8 +63,20 @@ Result<Statement> byRadius(const Connection& connection, const MapQuery& query,
   return statement;
 }
 
-Result<Statement> statementFor(const Connection& connection, const MapQuery& query,
-                               const WorldId& world) {
+/// Returns the ids, separated by commas, of objects whose class a correction may have changed.
+std::string correctedIds(const CorrectionsOf* corrections) {
+  std::string ids;
+  if (corrections == nullptr) return ids;
+  for (const auto& [id, all] : *corrections) {
+    ids += (ids.empty() ? "" : ",") + std::to_string(static_cast<std::int64_t>(id));
+  }
+  return ids;
+}
+
+}  // namespace
+
+Result<Statement> MapReader::statementFor(const MapQuery& query, const WorldId& world) const {
+  const Connection& connection = *connection_;
   const std::string from = std::string(kColumns) + "FROM objects o WHERE o.gone = 0 ";
   switch (query.kind) {
     case MapQueryKind::kById: {
@@ -95,7 +85,8 @@ Result<Statement> statementFor(const Connection& connection, const MapQuery& que
       return statement;
     }
     case MapQueryKind::kByClass: {
-      auto statement = connection.prepare(from + "AND o.class = ?1 ORDER BY o.id");
+      auto statement = connection.prepare(from + "AND (o.class = ?1 OR o.id IN (" +
+                                          correctedIds(corrections_) + ")) ORDER BY o.id");
       if (statement) statement->bind(1, query.class_name);
       return statement;
     }
@@ -111,6 +102,35 @@ Result<Statement> statementFor(const Connection& connection, const MapQuery& que
   }
   return fail("query_invalid", "a restore or the graph is no question about objects");
 }
+
+/// Reads at most `limit` rows. Reads one more row to set `truncated`. Objects of another class than
+/// that of a kByClass query are left out.
+Result<Found> MapReader::collect(Statement& statement, std::size_t limit,
+                                 const MapQuery& query) const {
+  Found found;
+  for (;;) {
+    const auto row = statement.step();
+    if (!row) return tl::unexpected<Reason>(row.error());
+    if (!*row) return found;
+    auto placed = beliefFrom(statement);
+    if (placed && corrections_ != nullptr) correct(*corrections_, placed->belief);
+    const bool by_class = query.kind == MapQueryKind::kByClass;
+    if (placed && by_class && placed->belief.best().name != query.class_name) continue;
+    if (found.objects.size() == limit) {
+      found.truncated = true;
+      statement.reset();
+      return found;
+    }
+    if (placed) {
+      found.objects.push_back(mapObjectOf(placed->belief, placed->world));
+      if (query.kind == MapQueryKind::kById) found.beliefs.push_back(std::move(placed->belief));
+    } else {
+      ++found.malformed;
+    }
+  }
+}
+
+namespace {
 
 /// Returns the beliefs of the working set. Those of confirmed tracks are in `tracks` or `objects`.
 std::vector<ObjectBelief> workingBeliefs(const Connection& connection) {
@@ -156,11 +176,26 @@ MapObject mapObjectOf(const ObjectBelief& belief, const WorldId& world) {
   return object;
 }
 
+std::vector<Correction> MapReader::correctionsFor(const MapQuery& query) const {
+  const bool all = query.kind == MapQueryKind::kAll;
+  std::map<std::uint64_t, Correction> by_id;  // one about two objects is listed twice
+  if (corrections_ == nullptr || (!all && query.kind != MapQueryKind::kById)) return {};
+  for (const auto& [object, of_object] : *corrections_) {
+    if (!all && object != query.object_id) continue;
+    for (const Correction& each : of_object) by_id[each.id] = each;
+  }
+  std::vector<Correction> result;
+  for (auto& [id, correction] : by_id) result.push_back(std::move(correction));
+  return result;
+}
+
 Result<Found> MapReader::find(const MapQuery& query, const WorldId& newest,
                               std::uint32_t limit) const {
   const WorldId world = query.world.world != 0 ? query.world : newest;
-  return statementFor(*connection_, query, world).and_then([&](Statement statement) {
-    return collect(statement, limit, query.kind == MapQueryKind::kById);
+  return statementFor(query, world).and_then([&](Statement statement) {
+    auto found = collect(statement, limit, query);
+    if (found) found->corrections = correctionsFor(query);
+    return found;
   });
 }
 
@@ -169,8 +204,10 @@ Result<std::vector<PlacedBelief>> MapReader::beliefs() const {
   const auto read =
       connection_->forRows(std::string(kColumns) + "FROM objects o WHERE o.gone = 0 ORDER BY o.id",
                            [&](const Statement& row) {
-                             if (auto placed = beliefFrom(row))
-                               beliefs.push_back(std::move(*placed));
+                             auto placed = beliefFrom(row);
+                             if (!placed) return;
+                             if (corrections_ != nullptr) correct(*corrections_, placed->belief);
+                             beliefs.push_back(std::move(*placed));
                            });
   return read.map([&] { return std::move(beliefs); });
 }
@@ -199,7 +236,8 @@ Result<Found> MapReader::inFullNear(const Eigen::Vector3d& centre, double radius
   query.low = centre;
   query.radius = radius;
   return byRadius(*connection_, query, world).and_then([&](Statement statement) {
-    return collect(statement, limit, true);
+    query.kind = MapQueryKind::kById;  // in full
+    return MapReader(connection_).collect(statement, limit, query);
   });
 }
 
@@ -271,6 +309,17 @@ Result<std::set<std::uint64_t>> MapReader::worlds() const {
                               [&](const Statement& row) { worlds.insert(row.id(0)); }));
     if (const auto last = need(working())) worlds.insert(last->world.world);
     return worlds;
+  });
+}
+
+Result<std::set<std::string>> MapReader::classes() const {
+  return attempt([&] {
+    const bool has_graph = need(connection_->has("graph_classes"));
+    std::set<std::string> classes;
+    need(connection_->forRows(std::string("SELECT DISTINCT class FROM objects") +
+                                  (has_graph ? " UNION SELECT name FROM graph_classes" : ""),
+                              [&](const Statement& row) { classes.insert(row.text(0)); }));
+    return classes;
   });
 }
 

@@ -165,7 +165,7 @@ void takeFacts(SavedGraph& graph, const std::set<mapping::SameObject>& facts) {
     }
     map.facts.insert(fact);
   }
-  const mapping::Identity identity(map.facts);
+  const mapping::Identity identity(map.facts, map.corrections);
   for (auto& [id, record] : map.records) {
     if (identity.isShared(id)) continue;
     record.sighting.in_anchor.id = id;
@@ -211,11 +211,28 @@ Result<std::set<mapping::SameObject>> readFacts(const Connection& connection) {
   });
 }
 
+Result<std::vector<Correction>> readCorrections(const Connection& connection) {
+  return attempt([&] {
+    std::vector<Correction> corrections;
+    if (!need(connection.has("corrections"))) return corrections;
+    need(connection.forRows(
+        "SELECT id, kind, object, other, class, nats, author, time_ns, withdrawn FROM corrections "
+        "WHERE kind BETWEEN 0 AND 3 ORDER BY id",
+        [&](const Statement& row) {
+          corrections.push_back({row.id(0), static_cast<CorrectionKind>(row.integer(1)), row.id(2),
+                                 row.id(3), row.text(4), row.real(5), row.text(6),
+                                 fromNanoseconds(row.integer(7)), row.integer(8) != 0});
+        }));
+    return corrections;
+  });
+}
+
 Result<SavedGraph> readGraph(const Connection& connection) {
   return inOneState(connection, [&] {
     SavedGraph graph;
     readAll(connection, graph);
     const auto facts = need(readFacts(connection));
+    graph.map.corrections = need(readCorrections(connection));
     leaveOutBrokenChains(graph);
     leaveOutDangling(graph);
     holdEachComponent(graph.map);

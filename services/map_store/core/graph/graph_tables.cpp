@@ -46,6 +46,10 @@ CREATE TABLE IF NOT EXISTS track_sightings(
 CREATE TABLE IF NOT EXISTS tracks(
   id INTEGER PRIMARY KEY, world INTEGER NOT NULL, epoch INTEGER NOT NULL,
   written INTEGER NOT NULL, gone INTEGER NOT NULL, gone_ns INTEGER, belief BLOB NOT NULL);
+CREATE TABLE IF NOT EXISTS corrections(
+  id INTEGER PRIMARY KEY, kind INTEGER NOT NULL, object INTEGER NOT NULL, other INTEGER NOT NULL,
+  class TEXT NOT NULL, nats REAL NOT NULL, author TEXT NOT NULL, time_ns INTEGER NOT NULL,
+  withdrawn INTEGER NOT NULL);
 DROP TABLE IF EXISTS merges;
 )sql";
 
@@ -62,6 +66,8 @@ constexpr char kPutSighting[] =
 constexpr char kPutTrack[] = "REPLACE INTO track_sightings VALUES(?1, ?2, ?3, ?4)";
 constexpr char kPutFact[] = "REPLACE INTO same VALUES(?1, ?2, ?3)";
 constexpr char kDeleteFact[] = "DELETE FROM same WHERE loop = ?1 AND a = ?2 AND b = ?3";
+constexpr char kPutCorrection[] =
+    "REPLACE INTO corrections VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)";
 constexpr char kPutView[] = "REPLACE INTO views VALUES(?1, ?2)";
 constexpr char kPutClass[] =
     "INSERT INTO graph_classes VALUES(?1, ?2) ON CONFLICT(number) DO UPDATE SET name = ?2 "
@@ -114,6 +120,10 @@ void bindTrack(Statement& to, const SightingRow& row) {
 
 void bindFact(Statement& to, const mapping::SameObject& fact) {
   to.bindAll(fact.loop, fact.a, fact.b);
+}
+
+void bindCorrection(Statement& to, const Correction& c) {
+  to.bindAll(c.id, c.kind, c.object, c.other, c.class_name, c.nats, c.author, c.time, c.withdrawn);
 }
 
 void bindView(Statement& to, const ViewRow& row) { to.bindAll(row.first, encodeView(row.second)); }
@@ -192,6 +202,7 @@ std::uint64_t writeGraph(const Connection& connection, const mapping::Unsaved& u
 void writeFacts(const Connection& connection, const mapping::Unsaved& unsaved) {
   runForEach(connection, kDeleteFact, unsaved.facts_gone, bindFact);
   runForEach(connection, kPutFact, unsaved.changed.facts, bindFact);
+  runForEach(connection, kPutCorrection, unsaved.changed.corrections, bindCorrection);
 }
 
 void sweepGraph(const Connection& connection) {

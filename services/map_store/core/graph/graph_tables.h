@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <set>
+#include <vector>
 
 #include "common/base/result.h"
 #include "services/map_store/core/graph/graph_codec.h"
@@ -14,8 +15,8 @@ namespace perdure::map_store {
 inline constexpr int kFirstSchemaWithGraph = 3;
 
 extern const char* const kGraphSchema;
-/// SQL that creates tables of later versions if they do not exist: views, and tracks that share an
-/// object.
+/// SQL that creates tables of later versions if they do not exist: views, tracks that share an
+/// object, and corrections by people.
 extern const char* const kAddedSchema;
 
 /// The graph in a file. It is consistent: it has the ends of all edges, the anchors of all
@@ -39,6 +40,9 @@ std::uint64_t writeGraph(const Connection& connection, const mapping::Unsaved& u
 
 /// Reads the pairs of tracks of the same object. Empty for maps with an older schema.
 Result<std::set<mapping::SameObject>> readFacts(const Connection& connection);
+/// Reads the corrections, sorted by id. Empty for files without them.
+Result<std::vector<Correction>> readCorrections(const Connection& connection);
+/// Writes the changes of facts and corrections.
 void writeFacts(const Connection& connection, const mapping::Unsaved& unsaved);
 
 /// Deletes the rows that readGraph() leaves out, because their ids will be reused.
