@@ -262,6 +262,7 @@ void Node::publish(const Frame& frame) {
     event.other_id = objectOf(event.other_id);
   }
   events.insert(events.end(), returns.begin(), returns.end());
+  corrections_.apply(objects);
   if (outputs_.objects) outputs_.objects(objects);
   for (const auto& event : events) {
     if (outputs_.events) outputs_.events(event);

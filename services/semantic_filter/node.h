@@ -13,6 +13,7 @@
 #include "services/semantic_filter/config.h"
 #include "services/semantic_filter/core/history.h"
 #include "services/semantic_filter/core/memory/archive.h"
+#include "services/semantic_filter/corrections.h"
 #include "services/semantic_filter/events.h"
 #include "services/semantic_filter/model_book.h"
 #include "services/semantic_filter/return_events.h"
@@ -88,6 +89,7 @@ class Node {
   InstanceId near_source_ = 0;           ///< writer of the newest `map/near` in use
   std::uint64_t near_revision_ = 0;
   std::map<TrackId, ObjectId> members_;    ///< as reported by the map
+  Corrections corrections_;                ///< as reported by the map
   std::map<TrackId, ObjectId> object_of_;  ///< as published; tracks with their own id are left out
   std::map<ObjectId, TrackId> track_of_;
   std::deque<EndedTrack> ended_;

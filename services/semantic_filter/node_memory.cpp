@@ -82,6 +82,7 @@ void Node::take(const MapNear& near, ExistenceEvidence evidence) {
   while (!ended_.empty() && ended_.front().time <= near.kept) dropOldestEnded();
   const auto arrivals = std::make_shared<const Arrivals>(arrivalsOf(near, evidence));
   members_ = arrivals->members;
+  corrections_.take(near.corrections);
   for (const EndedTrack& each : ended_) {  // the map may not have received these
     if (ended_confirmed_.contains(each.track)) noteMerge(each.into, each.track);
   }
