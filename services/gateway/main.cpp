@@ -283,11 +283,13 @@ void serve(service::Context& context, const gateway::Config& config, const std::
                                 server.reply(number, answer.status, answer.text);
                               });
   auto& questions = context.writer(bus::kTopic<MapQuery>);
+  auto& corrections = context.writer(bus::kTopic<MapCorrection>);
   gateway::Node node(config, vehicle, context.instance(),
                      {.message = [&](const gateway::Encoded& message) { server.publish(message); },
                       .time = [&](const TimePoint& time) { server.tellTime(time); },
                       .answer = [&](const gateway::Answer& answer) { server.answer(answer); },
-                      .query = [&](const MapQuery& query) { (void)questions.write(query); }});
+                      .query = [&](const MapQuery& query) { (void)questions.write(query); },
+                      .correction = [&](const MapCorrection& m) { (void)corrections.write(m); }});
   listenAlways(context, node);
   Beginning beginning(node);
   Readers readers(context, node, beginning, server, config);

@@ -359,7 +359,7 @@ void Node::tick(std::int64_t now_ns) {
     }
     if (now_ns >= one.next_ns) {
       one.next_ns = now_ns + kResend;
-      outputs_.query(one.query);
+      one.send();
     }
     ++it;
   }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <deque>
+#include <functional>
 #include <map>
 #include <optional>
 #include <set>
@@ -32,6 +33,7 @@ struct Outputs {
   Sink<TimePoint> time;  ///< time of the newest message
   Sink<Answer> answer;
   Sink<MapQuery> query;
+  Sink<MapCorrection> correction = [](const MapCorrection&) {};
 };
 
 /// Converts messages. Times `now_ns` are on CLOCK_MONOTONIC.
@@ -82,7 +84,7 @@ class Node {
  private:
   struct Pending {
     Call call;
-    MapQuery query;
+    std::function<void()> send;
     std::int64_t until_ns = 0, next_ns = 0;
   };
   /// Limits a rate by times of the sensor clock.
@@ -133,9 +135,15 @@ class Node {
   std::optional<Body> body() const;
   RigidTransform pose() const { return body().value_or(Body{}).T_WB; }
   WorldId world() const { return body().value_or(Body{}).world; }  ///< the current W
-  void ask(const Call& call, MapQuery query, std::int64_t now_ns);
+  /// Sends a question to map_store, again and again until the reply.
+  template <class Question>
+  void ask(const Call& call, Question question, const Sink<Question>& to, std::int64_t now_ns);
+  void ask(const Call& call, const MapQuery& query, std::int64_t now_ns) {
+    ask(call, query, outputs_.query, now_ns);
+  }
   void askForObject(const Call& call, std::int64_t now_ns);
   void askForMap(const Call& call, std::int64_t now_ns);
+  void askForCorrection(const Call& call, std::int64_t now_ns);
   void fail(const Call& call, const std::string& sentence);
   void answer(const Call& call, std::string payload, bool ok = true);
 

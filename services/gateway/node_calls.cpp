@@ -1,4 +1,6 @@
 // Service calls of clients: the full state of one object, and queries of the map.
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -18,8 +20,8 @@ std::optional<double> numberOf(const Json& object, const char* name) {
   return std::isfinite(value) ? std::optional(value) : std::nullopt;
 }
 
-std::optional<ObjectId> idOf(const Json& request) {
-  const auto found = request.find("id");
+std::optional<ObjectId> idOf(const Json& request, const char* name = "id") {
+  const auto found = request.find(name);
   if (found == request.end() || !found->is_number_unsigned()) return std::nullopt;
   return found->get<ObjectId>();
 }
@@ -67,6 +69,40 @@ std::optional<MapQuery> queryOf(const Json& request) {
   return query;
 }
 
+std::string textOf(const Json& request, const char* name) {
+  const auto found = request.find(name);
+  constexpr std::size_t kMost = 64;
+  return found != request.end() && found->is_string() ? found->get<std::string>().substr(0, kMost)
+                                                      : std::string();
+}
+
+/// Returns the correction of a request, or nothing if it has no valid one.
+std::optional<Correction> correctionOf(const Json& request) {
+  Correction correction;
+  correction.author = textOf(request, "author");
+  if (const auto id = idOf(request, "withdraw")) {
+    correction.id = *id;
+    correction.withdrawn = true;
+    return correction;
+  }
+  constexpr std::array kKinds{CorrectionKind::kNotThere, CorrectionKind::kClass,
+                              CorrectionKind::kSame, CorrectionKind::kDifferent};
+  const std::string name = textOf(request, "kind");
+  const auto kind = std::ranges::find(kKinds, name, [](auto k) { return std::string(nameOf(k)); });
+  const auto object = idOf(request, "object");
+  if (kind == kKinds.end() || !object) return std::nullopt;
+  correction.kind = *kind;
+  correction.object = *object;
+  correction.other = idOf(request, "other").value_or(0);
+  correction.class_name = textOf(request, "class");
+  correction.nats = std::clamp(numberOf(request, "nats").value_or(0.0), 0.0, kMostCorrectionNats);
+  if (correction.aboutTwo() && correction.other == 0) return std::nullopt;
+  if (correction.kind == CorrectionKind::kClass && correction.class_name.empty()) {
+    return std::nullopt;
+  }
+  return correction;
+}
+
 }  // namespace
 
 void Node::fail(const Call& call, const std::string& sentence) {
@@ -84,6 +120,8 @@ void Node::answer(const Call& call, std::string payload, bool ok) {
 void Node::onCall(const Call& call, std::int64_t now_ns) {
   if (call.service == kObjectService) {
     askForObject(call, now_ns);
+  } else if (call.service == kCorrectService) {
+    askForCorrection(call, now_ns);
   } else {
     askForMap(call, now_ns);
   }
@@ -119,14 +157,34 @@ void Node::askForMap(const Call& call, std::int64_t now_ns) {
   ask(call, *query, now_ns);
 }
 
-void Node::ask(const Call& call, MapQuery query, std::int64_t now_ns) {
+void Node::askForCorrection(const Call& call, std::int64_t now_ns) {
+  if (config_.web.token.empty()) {
+    reasons_.add("correction_without_token");
+    return fail(call,
+                "corrections need a token: set http.token of the gateway, and open its page with "
+                "?token=…");
+  }
+  const Json request = Json::parse(call.payload, nullptr, false);
+  const auto correction = request.is_object() ? correctionOf(request) : std::nullopt;
+  if (!correction) {
+    return fail(call,
+                "correct as {\"object\": 12, \"kind\": \"not_there\"}, {\"object\": 12, \"kind\": "
+                "\"class\", \"class\": \"car\"}, {\"object\": 12, \"kind\": \"same\" or "
+                "\"different\", \"other\": 15}, or {\"withdraw\": 3}");
+  }
+  ask(call, MapCorrection{0, 0, *correction}, outputs_.correction, now_ns);
+}
+
+template <class Question>
+void Node::ask(const Call& call, Question question, const Sink<Question>& to, std::int64_t now_ns) {
   if (pending_.size() >= kMostPending) {
     reasons_.add("too_many_questions");
     return fail(call, "too many questions wait for map_store");
   }
-  query.client = instance_;
-  query.request = next_request_++;
-  pending_[query.request] = {call, query, now_ns + kPatience, now_ns};
+  question.client = instance_;
+  question.request = next_request_++;
+  pending_[question.request] = {call, [question, &to] { to(question); }, now_ns + kPatience,
+                                now_ns};
   tick(now_ns);
 }
 
@@ -140,7 +198,7 @@ void Node::onMapReply(const MapReply& reply) {
     graph_pace_.answered(reply, ticked_ns_);
     return onMapGraph(reply);
   }
-  if (call.service == kMapQueryService) {
+  if (call.service == kMapQueryService || call.service == kCorrectService) {
     answer(call, mapReplyJson(reply, map_.mapOf(world())));
   } else if (reply.beliefs.empty() || reply.beliefs.front().classes.empty()) {
     answer(call, R"({"found":false})");

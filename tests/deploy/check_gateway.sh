@@ -53,4 +53,4 @@ gateway=
 grep -q 'BindReadOnlyPaths=-/etc/perdure/security/gateway$' "$unit" || fail "the unit does not see its identity"
 writes=$(grep -o '<publish>.*</publish>' "$folder/security/gateway/permissions.p7s" |
   grep -o '<topic>[^<]*' | sed 's|<topic>||' | sort | tr '\n' ' ')
-[ "$writes" = "perdure/ego/health perdure/ego/map/query " ] || fail "on a closed bus it may write $writes"
+[ "$writes" = "perdure/ego/health perdure/ego/map/correct perdure/ego/map/query " ] || fail "on a closed bus it may write $writes"

@@ -50,6 +50,13 @@ void putGlance(JsonWriter& json, const MapObject& object, bool elsewhere) {
   json.with("last_s", toSeconds(object.last_seen), 3).end('}');
 }
 
+void putCorrection(JsonWriter& json, const Correction& each) {
+  json.begin('{').with("id", each.id).with("kind", perdure::nameOf(each.kind));
+  json.with("object", each.object).with("other", each.other).with("class", each.class_name);
+  json.with("nats", each.nats).with("author", each.author);
+  json.with("time_s", toSeconds(each.time), 3).end('}');
+}
+
 template <class Kind>
 std::string kindName(std::size_t i, std::size_t known) {
   return i < known ? perdure::nameOf(static_cast<Kind>(i)) : fmt::format("kind_{}", i);
@@ -210,6 +217,8 @@ std::string mapReplyJson(const MapReply& reply, const WorldId& map) {
   JsonWriter json(256 + 512 * reply.objects.size());
   json.begin('{').with("truncated", reply.truncated).key("objects").begin('[');
   for (const MapObject& object : reply.objects) putGlance(json, object, object.world != map);
+  json.end(']').key("corrections").begin('[');
+  for (const Correction& each : reply.corrections) putCorrection(json, each);
   return json.end(']').end('}').take();
 }
 

@@ -67,7 +67,9 @@ std::vector<ServiceInfo> serviceTable() {
   return {{kObjectService, "/object", "perdure.Object", jsonSchema("perdure.ObjectRequest"),
            jsonSchema("perdure.Object")},
           {kMapQueryService, "/map/query", "perdure.MapQuery", jsonSchema("perdure.MapRequest"),
-           jsonSchema("perdure.MapReply")}};
+           jsonSchema("perdure.MapReply")},
+          {kCorrectService, "/map/correct", "perdure.MapCorrection",
+           jsonSchema("perdure.CorrectionRequest"), jsonSchema("perdure.MapReply")}};
 }
 
 ServiceInfo nextEventService() {

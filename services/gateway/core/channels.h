@@ -84,7 +84,8 @@ enum Service : std::uint32_t {
   kGraphOfTheMap = 0,  ///< a query of the gateway itself; clients cannot call it
   kObjectService = 1,
   kMapQueryService,
-  kNextEventService
+  kNextEventService,
+  kCorrectService
 };
 struct ServiceInfo {
   std::uint32_t id = 0;

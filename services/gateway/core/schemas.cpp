@@ -210,8 +210,20 @@ perdure.MapRequest!
  radius number
  low number[]: x y z, m: a box, with high
  high number[]; limit natural
+perdure.CorrectionRequest!
+ object natural
+ kind text: not_there, class, same, different
+ class text: the right one
+ other natural: for same and different
+ nats number: log-likelihood ratio; else the map's default
+ author text
+ withdraw natural: the id of a correction, instead of the members above
+correction
+ id natural; kind text; object natural; other natural; class text; nats number; author text
+ time_s number: of the newest frame of the map
 perdure.MapReply!
  truncated boolean; objects object_summary[]
+ corrections correction[]: standing ones of the object with this id, or all
 )";
 
 using Types = std::map<std::string, Schema, std::less<>>;

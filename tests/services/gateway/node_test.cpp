@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/services/gateway/objects.h"
+#include "tests/support/corrections.h"
 
 namespace perdure::gateway {
 namespace {
@@ -17,8 +18,16 @@ using test::objectAt;
 using ::testing::HasSubstr;
 constexpr std::int64_t kSecond = 1'000'000'000;
 
+Config configWith(const std::string& token) {
+  Config config;
+  config.web.token = token;
+  return config;
+}
+
 class GatewayNode : public ::testing::Test {
  protected:
+  explicit GatewayNode(const std::string& token = "") : config_(configWith(token)) {}
+
   std::vector<json> on(std::uint32_t channel) const {
     std::vector<json> found;
     for (const Encoded& one : said_) {
@@ -39,6 +48,7 @@ class GatewayNode : public ::testing::Test {
   std::vector<Encoded> said_;
   std::vector<Answer> answers_;
   std::vector<MapQuery> queries_;
+  std::vector<MapCorrection> corrections_;
   Config config_;
   Node node_{config_,
              "ego",
@@ -46,7 +56,12 @@ class GatewayNode : public ::testing::Test {
              {.message = [this](const Encoded& m) { said_.push_back(m); },
               .time = [](const TimePoint&) {},
               .answer = [this](const Answer& a) { answers_.push_back(a); },
-              .query = [this](const MapQuery& q) { queries_.push_back(q); }}};
+              .query = [this](const MapQuery& q) { queries_.push_back(q); },
+              .correction = [this](const MapCorrection& c) { corrections_.push_back(c); }}};
+};
+
+struct GatewayNodeWithToken : GatewayNode {
+  GatewayNodeWithToken() : GatewayNode("secret") {}
 };
 
 TEST_F(GatewayNode, MakesNothingWhileNobodyLooks) {
@@ -209,6 +224,53 @@ TEST_F(GatewayNode, RefusesQuestionsThatMakeNoSense) {
   node_.onCall({7, kObjectService, 1, "{}"}, kSecond);
   EXPECT_FALSE(answers_.at(0).ok);
   EXPECT_TRUE(queries_.empty());
+}
+
+TEST_F(GatewayNode, TakesNoCorrectionsWithoutAToken) {
+  node_.onCall({7, kCorrectService, 1, R"({"object":12,"kind":"not_there"})"}, kSecond);
+  ASSERT_EQ(answers_.size(), 1u);
+  EXPECT_FALSE(answers_[0].ok);
+  EXPECT_THAT(answers_[0].payload, HasSubstr("set http.token"));
+  EXPECT_TRUE(corrections_.empty());
+}
+
+TEST_F(GatewayNodeWithToken, SendsCorrectionsToTheMapAndPassesItsAnswer) {
+  node_.onCall(
+      {7, kCorrectService, 1, R"({"object":12,"kind":"same","other":15,"nats":3,"author":"Ada"})"},
+      kSecond);
+  node_.onCall({7, kCorrectService, 2, R"({"withdraw":4})"}, kSecond);
+  ASSERT_EQ(corrections_.size(), 2u);
+  Correction expected = perdure::test::ofTwo(CorrectionKind::kSame, 12, 15, 3.0);
+  expected.author = "Ada";
+  EXPECT_EQ(corrections_[0].correction, expected);
+  EXPECT_EQ(corrections_[1].correction, perdure::test::withdrawal(4));
+  node_.tick(kSecond + 6 * kSecond / 10);
+  EXPECT_EQ(corrections_.size(), 4u);  // sent again, until the map answers
+  MapReply reply;
+  reply.client = 5;
+  reply.request = corrections_[0].request;
+  reply.corrections = {expected};
+  node_.onMapReply(reply);
+  reply.request = corrections_[1].request;
+  reply.ok = false;
+  reply.error = "no correction 4 stands";
+  node_.onMapReply(reply);
+  ASSERT_EQ(answers_.size(), 2u);
+  EXPECT_EQ(json::parse(answers_[0].payload)["corrections"][0]["kind"], "same");
+  EXPECT_FALSE(answers_[1].ok);
+  EXPECT_EQ(answers_[1].payload, "no correction 4 stands");
+}
+
+TEST_F(GatewayNodeWithToken, RefusesCorrectionsThatSayNothing) {
+  for (const char* text : {"", "[]", "{}", R"({"object":12})", R"({"object":12,"kind":"gone"})",
+                           R"({"object":-1,"kind":"not_there"})", R"({"object":12,"kind":"class"})",
+                           R"({"object":12,"kind":"same"})", R"({"withdraw":"4"})"}) {
+    node_.onCall({7, kCorrectService, 1, text}, kSecond);
+    ASSERT_FALSE(answers_.empty()) << text;
+    EXPECT_THAT(answers_.back().payload, HasSubstr("correct as {\"object\": 12")) << text;
+    answers_.clear();
+  }
+  EXPECT_TRUE(corrections_.empty());
 }
 
 TEST_F(GatewayNode, LetsOnlySoManyQuestionsWait) {

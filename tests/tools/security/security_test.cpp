@@ -159,9 +159,10 @@ TEST(Permissions, AreTheLeastThatEachRoleNeeds) {
   EXPECT_THAT(permissionsOf(Role::kSubscriber).reads, Contains("objects"));
   EXPECT_THAT(permissionsOf(Role::kCapture).writes,
               ElementsAre("frame/*", "imu", "speed", "calibration", "health"));
-  EXPECT_THAT(permissionsOf(Role::kOperator).writes, ElementsAre("map/query"));
+  EXPECT_THAT(permissionsOf(Role::kOperator).writes, ElementsAre("map/query", "map/correct"));
   EXPECT_THAT(permissionsOf(Role::kRecord).writes, ElementsAre("health"));
-  EXPECT_THAT(permissionsOf(Role::kGateway).writes, ElementsAre("map/query", "health"));
+  EXPECT_THAT(permissionsOf(Role::kGateway).writes,
+              ElementsAre("map/query", "map/correct", "health"));
   EXPECT_THAT(permissionsOf(Role::kGateway).reads, Contains("frame/*"));
   EXPECT_THAT(permissionsOf(Role::kRos2).writes, ElementsAre("health"));
   EXPECT_THAT(permissionsOf(Role::kRos2).reads, Contains("frame/*"));

@@ -1,4 +1,5 @@
 // Shows all data of one object. While open, requests them from the gateway twice a second.
+import { Corrections } from './corrections.js';
 import { chart } from './plots.js';
 import { classWords, colourOf, escaped, existenceWords, isHidden, isInSight, percent, visibilityWords } from './words.js';
 
@@ -11,6 +12,7 @@ export class ObjectPanel {
     this.connection = connection;
     this.id = 0;
     this.part = this.told = null;
+    this.corrections = new Corrections(connection);
     element.addEventListener('click', (e) => {
       const link = e.target.closest('[data-object]');
       if (link) onLink(Number(link.dataset.object));
@@ -46,6 +48,9 @@ export class ObjectPanel {
     this.note = '';
     this.shown = performance.now();
     if (id === 0) return this.clear();
+    this.element.innerHTML = '<div></div>';
+    this.element.append(this.corrections.element);
+    this.corrections.show(id);
     this.render(); // shows the data that are already available
     this.ask();
   }
@@ -72,13 +77,13 @@ export class ObjectPanel {
   render() {
     const o = this.model.objects.get(this.id) ?? this.full?.object ?? this.model.find(this.id);
     if (!o) {
-      this.element.innerHTML = `<p class="empty">${escaped(this.note || 'Waiting for its data …')}</p>`;
+      this.element.firstChild.innerHTML = `<p class="empty">${escaped(this.note || 'Waiting for its data …')}</p>`;
       return;
     }
     // Keeps the content while text is being selected.
     if (String(getSelection()).length > 0 && this.element.contains(getSelection().anchorNode)) return;
     const top = this.element.scrollTop;
-    this.element.innerHTML = this.heading(o) + this.whereWords(o) + this.existenceChart(o) + this.classes() + this.ledger() + this.margins() + this.place(o) + this.covariance();
+    this.element.firstChild.innerHTML = this.heading(o) + this.whereWords(o) + this.existenceChart(o) + this.classes() + this.ledger() + this.margins() + this.place(o) + this.covariance();
     this.element.scrollTop = top;
     this.element.dataset.object = String(this.id);
   }

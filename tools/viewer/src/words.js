@@ -50,6 +50,7 @@ export function existenceWords(kind, n) {
     merge: `merged ${times(n)} with an object that was the same`,
     restore: `back from a restart ${times(n)}: evidence from before this ledger`,
     recall: `back from the map ${times(n)}: evidence from before this ledger`,
+    person: `stated by people ${times(n)}`,
   };
   return words[kind] ?? kind;
 }
@@ -65,6 +66,7 @@ export function classWords(kind) {
     merge: 'merged objects',
     restore: 'evidence from before this ledger',
     context: 'objects near it',
+    person: 'stated by people',
   };
   return words[kind] ?? kind;
 }

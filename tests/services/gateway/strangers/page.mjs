@@ -105,6 +105,37 @@ for (const words of ['exists', 'WHAT IT IS', 'EVIDENCE THAT IT EXISTS', 'detecte
 await pause(700);
 await page.screenshot({ path: join(out, 'object.png') });
 
+// A correction is sent from the object's panel, and taken back. This gateway has no token.
+const status = () => page.$eval('#object [role=status]', (e) => e.textContent);
+await page.click('#object .corrections > button');
+await page.waitForFunction(() => document.querySelector('#object [role=status]').textContent, { timeout: 10000, polling: 50 }).catch(() => {});
+const refused = await status();
+const corrected = await page.evaluate(async () => {
+  const { connection, model } = window.perdure, call = connection.call.bind(connection), sent = [];
+  const form = document.querySelector('#object .corrections'), wait = () => new Promise((r) => setTimeout(r, 50));
+  let standing = [{ id: 7, kind: 'class', object: model.chosen, other: 0, class: 'van', nats: 10, author: 'Ada' }];
+  connection.call = (name, request) => {
+    if (name === '/map/query') return Promise.resolve({ corrections: standing });
+    if (name !== '/map/correct') return call(name, request);
+    sent.push(request);
+    return Promise.resolve({});
+  };
+  form.elements.kind.value = 'class';
+  form.elements.kind.dispatchEvent(new Event('change', { bubbles: true }));
+  form.elements.value.value = 'van';
+  form.requestSubmit();
+  await wait();
+  const list = form.querySelector('ul').innerText;
+  standing = [];
+  form.querySelector('[data-withdraw]').click();
+  await wait();
+  connection.call = call;
+  return { sent, list, left: form.querySelectorAll('li').length };
+});
+check(refused.includes('set http.token'), `corrections without a token (${refused})`);
+check(corrected.sent[0]?.kind === 'class' && corrected.sent[0].class === 'van' && corrected.sent[0].object > 0 && corrected.sent[1]?.withdraw === 7
+  && corrected.list.includes('Its class is van 10.0 nats, Ada') && corrected.left === 0, `a correction (${JSON.stringify(corrected)})`);
+
 // A number is an id and words begin words; the map's answer stays until the search changes.
 const rowsOf = async (search) => {
   await page.$eval('#search', (e, value) => { e.value = value; e.dispatchEvent(new Event('input')); }, search);
