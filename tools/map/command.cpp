@@ -9,14 +9,14 @@
 
 #include "common/base/checked_file.h"
 #include "common/base/errors.h"
-#include "common/bus/map_client.h"
 #include "common/types/ledger_json.h"
 #include "services/map_store/core/graph/graph_answer.h"
 #include "services/map_store/fleet/map_transfer.h"
-#include "tools/bus_tools/common.h"
+#include "tools/map/correct_command.h"
 #include "tools/map/fuse.h"
 #include "tools/map/graph_view.h"
 #include "tools/map/look_command.h"
+#include "tools/map/map_place.h"
 #include "tools/map/map_source.h"
 #include "tools/map/render.h"
 #include "tools/map/why.h"
@@ -26,9 +26,7 @@ namespace perdure::tools {
 namespace {
 
 struct Request {
-  bus::Options bus;
-  std::string db;
-  double patience_s = 5.0;
+  MapPlace place;
   bool json = false, geojson = false;
   std::string out, frame = "M";
   std::vector<double> radius, box, anchor;
@@ -36,38 +34,26 @@ struct Request {
   MapQuery query;
 };
 
-MapReply askOverDds(const Request& request) {
-  const bus::Domain domain(request.bus);
-  const bus::Participant participant(domain, "perdure map");
-  const auto reply = bus::MapClient(participant).ask(request.query, request.patience_s);
-  if (reply) return *reply;
-  const bus::Options& bus = domain.options();
-  throw StartupError(
-      ExitCode::kUnavailable,
-      "{} on domain {}, interface {}, vehicle {} within {} s; start perdure-map-store there, or "
-      "read its file with --db",
-      reply.error().code == "no_answer" ? "map_store does not answer" : "there is no map_store",
-      bus.domain, bus.interface, bus.vehicle, request.patience_s);
-}
-
 MapReply askFile(const Request& request) {
-  return MapFile(request.db)
+  return MapFile(request.place.db)
       .ask(request.query, request.frame == "W" ? MapFrameChoice::kW : MapFrameChoice::kM);
 }
 
 MapReply ask(const Request& request) {
-  if (request.db.empty() && request.frame == "W") {
+  if (request.place.db.empty() && request.frame == "W") {
     throw StartupError(ExitCode::kUsage,
                        "--frame W reads what is stored: give the map's file with --db; a running "
                        "map_store answers in M");
   }
-  MapReply reply = request.db.empty() ? askOverDds(request) : askFile(request);
+  MapReply reply =
+      request.place.db.empty() ? askOverDds(request.place, request.query) : askFile(request);
   if (!reply.ok) throw StartupError(ExitCode::kUsage, reply.error);
   if (reply.truncated) {
     std::cerr << "perdure map: there are more than these " << reply.objects.size()
               << " objects; raise --limit"
-              << (request.db.empty() ? " and map_store's query.limit, or read the file with --db"
-                                     : "")
+              << (request.place.db.empty()
+                      ? " and map_store's query.limit, or read the file with --db"
+                      : "")
               << "\n";
   }
   return reply;
@@ -109,7 +95,7 @@ void why(const Request& request) {
   }
   const ObjectBelief& belief = reply.beliefs.front();
   std::optional<Standing> standing;  // not available from a running map_store
-  if (!request.db.empty()) standing = MapFile(request.db).standing(belief.id);
+  if (!request.place.db.empty()) standing = MapFile(request.place.db).standing(belief.id);
   if (request.json) {
     auto json = toJson(belief.why);
     if (standing) json["map"] = toJson(*standing);
@@ -141,8 +127,8 @@ void chooseKind(Request& request) {
 
 std::optional<GeoAnchor> anchorOf(const Request& request) {
   if (request.anchor.empty()) {
-    const bool known = !request.db.empty() && request.frame == "M";
-    return known ? MapFile(request.db).earthAnchor() : std::nullopt;
+    const bool known = !request.place.db.empty() && request.frame == "M";
+    return known ? MapFile(request.place.db).earthAnchor() : std::nullopt;
   }
   const auto& a = request.anchor;
   return GeoAnchor{{}, a[0], a[1], a[2], a[3] * std::numbers::pi / 180.0};
@@ -150,11 +136,11 @@ std::optional<GeoAnchor> anchorOf(const Request& request) {
 
 void showGraph(const Request& request) {
   MapReply graph;
-  if (request.db.empty()) {
-    graph = askOverDds(request);
+  if (request.place.db.empty()) {
+    graph = askOverDds(request.place, request.query);
     if (!graph.ok) throw StartupError(ExitCode::kUsage, graph.error);
   } else {
-    graph = MapFile(request.db).graph(request.query);
+    graph = MapFile(request.place.db).graph(request.query);
   }
   std::cout << (request.json ? toGraphJson(graph).dump(1) + "\n" : toGraphText(graph));
 }
@@ -230,16 +216,8 @@ void addServerCommands(CLI::App& map) {
   }
 }
 
-void addPlace(CLI::App& command, Request& request) {
-  command.add_option("--db", request.db, "read this file instead of asking the running map_store")
-      ->type_name("FILE");
-  addBusOptions(command, request.bus);
-  command.add_option("--wait", request.patience_s, "seconds until giving up")
-      ->check(CLI::PositiveNumber);
-}
-
 void addSource(CLI::App& command, Request& request) {
-  addPlace(command, request);
+  addPlace(command, request.place);
   command
       .add_option(
           "--frame", request.frame,
@@ -296,7 +274,7 @@ void setUpMap(CLI::App& map) {
     request->query.limit = map_store::kMostAnchors;
     showGraph(*request);
   });
-  addPlace(*graph, *request);
+  addPlace(*graph, request->place);
 
   CLI::App* exporting = map.add_subcommand("export", "The map as JSON or GeoJSON");
   exporting->add_flag("--geojson", request->geojson, "GeoJSON (RFC 7946)");
@@ -308,6 +286,7 @@ void setUpMap(CLI::App& map) {
   exporting->add_option("--out", request->out, "into this file")->type_name("FILE");
   exporting->callback([request] { exportMap(*request); });
 
+  addCorrectCommand(map);
   addServerCommands(map);
   addFuseCommand(map);
   addLookCommand(map);

@@ -13,8 +13,11 @@
 #include "common/base/errors.h"
 #include "services/map_store/core/map_contents.h"
 #include "services/map_store/core/map_database.h"
+#include "services/map_store/node.h"
 #include "tests/common/mapping/fusion/drives.h"
 #include "tests/services/map_store/beliefs.h"
+#include "tests/support/corrections.h"
+#include "tools/map/map_source.h"
 
 namespace perdure::tools {
 namespace {
@@ -266,6 +269,62 @@ TEST_F(FuseFiles, WhatJoinsNothingIsSaidInOneLine) {
   const FuseOutcome outcome = fuseFiles({{first(), folder.file("far")}, out()});
   ASSERT_EQ(outcome.parts.size(), 2u);
   EXPECT_THAT(toText(outcome), HasSubstr("joins nothing yet"));
+}
+
+/// Sends a correction to a map_store that has opened the file.
+MapReply correct(const std::string& path, const Correction& correction) {
+  map_store::Config config;
+  config.store_path = path;
+  MapReply answer;
+  map_store::Node node(config, 5,
+                       {.tile = [](const MapTile&) {},
+                        .emptied = [](const MapTile&) {},
+                        .header = [](const MapHeader&) {},
+                        .reply = [&](const MapReply& reply) { answer = reply; },
+                        .near = [](const MapNear&) {}});
+  node.onCorrection({1, 1, correction});
+  EXPECT_TRUE(answer.ok) << answer.error;
+  return answer;
+}
+
+MapReply allOf(const std::string& path) {
+  MapQuery query;
+  query.limit = 1000;
+  return MapFile(path).ask(query);
+}
+
+TEST_F(FuseFiles, CorrectionsStandInTheFusedMapAndCanBeWithdrawnThere) {
+  const std::string a = first(), b = second();
+  (void)fuseFiles({{a, b}, out("plain")});
+  const auto plain = allOf(out("plain")).objects;
+  const ObjectId of_a = allOf(a).objects.front().id, of_b = allOf(b).objects.back().id;
+  (void)correct(a, test::notThere(of_a, 3.0, "Ada"));
+  const ObjectId other = allOf(b).objects.front().id;
+  (void)correct(b, test::ofTwo(CorrectionKind::kDifferent, of_b, other));
+  (void)correct(b, test::notThere(of_b, 4.0, "Bo"));
+  (void)fuseFiles({{a, b, a}, out()});
+  EXPECT_TRUE(beliefBytes(out()) == beliefBytes(out("plain")));
+  const MapReply fused = allOf(out());
+  ASSERT_EQ(fused.corrections.size(), 3u);
+  std::size_t changed = 0;
+  for (std::size_t k = 0; k < plain.size(); ++k) {
+    const double fall = logOdds(plain[k].existence) - logOdds(fused.objects[k].existence);
+    for (const Correction& each : fused.corrections) {
+      if (each.aboutTwo() || each.object != plain[k].id) continue;
+      ++changed;
+      EXPECT_NEAR(fall, each.nats, 1e-9) << each.author;
+    }
+  }
+  EXPECT_EQ(changed, 2u);
+  for (const Correction& each : fused.corrections) {
+    (void)correct(out(), test::withdrawal(each.id));
+  }
+  const MapReply after = allOf(out());
+  EXPECT_TRUE(after.corrections.empty());
+  ASSERT_EQ(after.objects.size(), plain.size());
+  for (std::size_t k = 0; k < plain.size(); ++k) {
+    EXPECT_EQ(after.objects[k].existence, plain[k].existence);
+  }
 }
 
 }  // namespace
