@@ -203,6 +203,30 @@ class Maps(unittest.TestCase):
         with self.assertRaisesRegex(perdure.Refused, "3 numbers each"):
             map_.in_box((0, 0), (1, 1, 1))
 
+    def check_corrections(self, map_):
+        some, other = map_.objects()[:2]
+        said = map_.correct(some.id, not_there=True, nats=3.0, author="Ada")
+        self.assertEqual((said.kind, said.object, said.author), ("not_there", some.id, "Ada"))
+        odds = lambda o: np.log(o.existence / (1 - o.existence))  # noqa: E731
+        self.assertAlmostEqual(odds(map_[some.id]), odds(some) - 3.0, places=6)
+        self.assertEqual([c.id for c in map_.corrections()], [said.id])
+        self.assertTrue(map_.withdraw(said.id).withdrawn)
+        self.assertEqual(map_[some.id], some)
+        joined = map_.correct(other.id, same_as=some.id)
+        self.assertEqual((joined.kind, joined.nats), ("same", 10.0))
+        self.assertNotIn(max(some.id, other.id), map_)
+        map_.withdraw(joined.id)
+        self.assertEqual(map_.objects()[:2], [some, other])
+        with self.assertRaisesRegex(perdure.Refused, "no object 7777"):
+            map_.correct(7777, class_name="car")
+        with self.assertRaisesRegex(perdure.Refused, "give one of"):
+            map_.correct(some.id, not_there=True, class_name="car")
+
+    def test_a_file_is_corrected_and_the_correction_is_taken_back(self):
+        copy = drive.folder / "corrected.sqlite"
+        shutil.copy(drive.map, copy)
+        self.check_corrections(perdure.Map(copy))
+
     def test_poses_are_ranked_as_perdure_map_look_ranks_them(self):
         map_ = perdure.Map(drive.map)
         poses = [(0, 0, 0, 0), (0, 0, 0, np.pi)]
@@ -239,6 +263,9 @@ class Maps(unittest.TestCase):
             self.assertEqual([o.id for o in map_.near((30, 0, 0), 9)], [
                 o.id for o in perdure.Map(drive.map).near((30, 0, 0), 9)
             ])  # fmt: skip
+            self.check_corrections(map_)
+            with self.assertRaisesRegex(perdure.Unusable, "is in use by another program"):
+                perdure.Map(copy).withdraw(1)
         with self.assertRaisesRegex(perdure.Unavailable, "no map store answers within 0.2 s"):
             perdure.Map(vehicle="nobody", patience_s=0.2).objects()
 

@@ -1,5 +1,6 @@
 """The durable map of objects: ``Map``."""
 
+import getpass
 import json
 import os
 import pathlib
@@ -39,6 +40,13 @@ def _command() -> str:
     return found
 
 
+def _user() -> str:
+    try:
+        return getpass.getuser()
+    except (OSError, KeyError):
+        return str(os.getuid())
+
+
 class Map:
     """A map of objects: a file, or that of the running map store.
 
@@ -68,7 +76,7 @@ class Map:
         self._settings = settings
         self._client = secrets.randbits(64)
         self._request = 0
-        self._line = None
+        self._lines = {}
 
     def objects(self) -> List["messages.MapObject"]:
         """All objects, by id."""
@@ -105,6 +113,37 @@ class Map:
         evidence. None if the object does not exist."""
         beliefs = self._ask(kind="by_id", object_id=object_id).beliefs
         return beliefs[0] if beliefs else None
+
+    def corrections(self) -> List["messages.Correction"]:
+        """The standing corrections of people, by id."""
+        return self._ask(kind="all").corrections
+
+    def correct(
+        self, object_id: int, *, not_there: bool = False, class_name: Optional[str] = None,
+        same_as: Optional[int] = None, different_from: Optional[int] = None,
+        nats: float = 0.0, author: Optional[str] = None,
+    ) -> "messages.Correction":  # fmt: skip
+        """States that the map is wrong about an object. Give one of the four statements.
+
+        not_there: it does not exist. class_name: its right class. same_as: it is the same as this
+        object. different_from: this object, or a track merged into it, is another one. nats:
+        log-likelihood ratio of the statement; 0: the map store's ``corrections.nats``. author: by
+        default, the user's name. The result's ``id`` serves to ``withdraw`` it. A file must not be
+        in use by a map store; with ``bus.security`` this needs the role ``operator``.
+        """
+        if [not_there or None, class_name, same_as, different_from].count(None) != 3:
+            raise Refused("give one of not_there=True, class_name, same_as, different_from")
+        statement = {"kind": "not_there"}
+        if class_name is not None:
+            statement = {"kind": "class", "class_name": class_name}
+        elif not not_there:
+            other = different_from if same_as is None else same_as
+            statement = {"kind": "same" if same_as is not None else "different", "other": other}
+        return self._correct(object=object_id, nats=nats, author=author or _user(), **statement)
+
+    def withdraw(self, correction_id: int) -> "messages.Correction":
+        """Takes a correction back. The map is then as if it had not been stated."""
+        return self._correct(id=correction_id, withdrawn=True)
 
     def look(self, poses, *, rig, route=False, step_s=1.0, after_s=0.0, by=()) -> List[dict]:
         """What poses of the body are expected to show, the most bits first: `perdure map look`.
@@ -167,21 +206,39 @@ class Map:
             )
         return reply
 
+    def _correct(self, **fields):
+        if self._path is None:
+            request = messages.MapCorrection(correction=messages.Correction(**fields))
+            return self._ask_bus(request, "map/correct", Refused).corrections[0]
+        words = {"other": {"same": "--same-as", "different": "--different-from"}, "id": "--withdraw",
+                 "class_name": "--class", "nats": "--nats", "author": "--author"}  # fmt: skip
+        command = [_command(), "map", "correct", "--db", self._path, "--json"]
+        command += [str(fields["object"])] if "object" in fields else []
+        command += ["--not-there"] if fields.get("kind") == "not_there" else []
+        for name in sorted(words.keys() & fields.keys()):
+            option = words[name] if name != "other" else words[name][fields["kind"]]
+            command += [option, str(fields[name])]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            wrong = done.returncode in (1, 64)  # the statement, not the file
+            raise (Refused if wrong else Unusable)(done.stderr.strip())
+        return messages.Correction(**json.loads(done.stdout)[0])
+
     def _ask_file(self, query):
         try:
             return _files().ask(self._path, query, self._as_stored)
         except Unavailable as error:
             raise Unusable(str(error)) from None  # the file exists
 
-    def _ask_bus(self, query):
+    def _ask_bus(self, query, topic="map/query", refusal=Unavailable):
         """Repeats the query each half second until a reply arrives, because a request is lost if
         sent before reader and writer are matched."""
-        if self._line is None:
-            self._line = (
-                Publisher("map/query", **self._settings),
+        if topic not in self._lines:
+            self._lines[topic] = (
+                Publisher(topic, **self._settings),
                 Subscription(("map/reply",), **self._settings),
             )
-        questions, answers = self._line
+        questions, answers = self._lines[topic]
         self._request += 1
         query.client, query.request = self._client, self._request
         end, again = time.monotonic() + self._patience_s, 0.0
@@ -194,7 +251,7 @@ class Map:
             if reply is None or (reply.client, reply.request) != (query.client, query.request):
                 continue
             if not reply.ok:
-                raise Unavailable(reply.error)
+                raise refusal(reply.error)
             return reply
         raise Unavailable(
             f"no map store answers within {self._patience_s} s: {answers.why_silent()}; "
