@@ -97,7 +97,7 @@ TEST(Why, ShowsEvidenceOfKindsThatItDoesNotKnow) {
   o.why.existence.push_back({1.5, 2, at(102.0), at(103.0)});
   o.existence = 1.0 / (1.0 + std::exp(-o.why.logOdds()));
   EXPECT_THAT(toWhy(o), HasSubstr("+1.50  evidence of a kind that this program does not know"));
-  EXPECT_EQ(toJson(o.why)["existence"]["kind_14"]["count"], 2);
+  EXPECT_EQ(toJson(o.why)["existence"]["kind_" + std::to_string(kExistenceEvidences)]["count"], 2);
 }
 
 TEST(Why, NamesKindsInJson) {
