@@ -55,8 +55,10 @@ from .messages import MapTile as MapTile
 from .messages import MapHeader as MapHeader
 from .messages import MapFrame as MapFrame
 from .messages import Member as Member
+from .messages import Correction as Correction
 from .messages import MapNear as MapNear
 from .messages import MapQuery as MapQuery
+from .messages import MapCorrection as MapCorrection
 from .messages import MapAnchor as MapAnchor
 from .messages import MapLoopPair as MapLoopPair
 from .messages import MapLoop as MapLoop

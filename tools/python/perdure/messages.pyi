@@ -272,6 +272,7 @@ class Objects(Message):
     near_revision: int  # int
     near_m: float  # float
     ended: List[EndedTrack]  # list of EndedTrack
+    as_estimated: List[ObjectBelief]  # list of ObjectBelief, the filter's own beliefs of objects that people corrected
     def __iter__(self) -> Iterator[ObjectBelief]: ...
     def __len__(self) -> int: ...
     def __getitem__(self, index: Any) -> ObjectBelief: ...
@@ -387,6 +388,17 @@ class Member(Message):
     track: int  # int
     object: int  # int
 
+class Correction(Message):
+    id: int  # int
+    kind: Literal["not_there", "class", "same", "different"]  # not_there | class | same | different
+    object: int  # int
+    other: int  # int
+    class_name: str  # str
+    nats: float  # log-likelihood ratio; 0 in requests: the map store's default
+    author: str  # str
+    time_ns: int  # ns, sensor clock
+    withdrawn: bool  # bool
+
 class MapNear(Message):
     stamp: FrameStamp  # FrameStamp
     instance: int  # int
@@ -400,6 +412,7 @@ class MapNear(Message):
     members: List[Member]  # list of Member
     placed: List[ObjectBelief]  # list of ObjectBelief
     as_published: List[ObjectBelief]  # list of ObjectBelief
+    corrections: List[Correction]  # list of Correction
 
 class MapQuery(Message):
     client: int  # int
@@ -412,6 +425,11 @@ class MapQuery(Message):
     radius: float  # m
     world: WorldId  # WorldId
     limit: int  # int
+
+class MapCorrection(Message):
+    client: int  # int
+    request: int  # int
+    correction: Correction  # Correction
 
 class MapAnchor(Message):
     id: int  # int
@@ -453,6 +471,7 @@ class MapReply(Message):
     loops: List[MapLoop]  # list of MapLoop, between these
     anchor_count: int  # of the same M, those not told too
     loop_count: int  # of the same M, those not told too
+    corrections: List[Correction]  # list of Correction
 
 class Health(Message):
     process: str  # not empty
