@@ -10,7 +10,7 @@
 #include "common/math/gaussian.h"
 #include "common/math/so3.h"
 #include "services/vio/core/start/initialiser.h"
-#include "services/vio/core/start/linear_start.h"
+#include "services/vio/core/start/motion_path.h"
 #include "services/vio/core/start/motion_refinement.h"
 
 namespace perdure::vio {
@@ -23,9 +23,10 @@ constexpr std::size_t kKeyframes = 8, kFewestTracks = 15, kFewestViews = 3, kMos
 constexpr double kShortestWindow = 0.2;  // s
 constexpr double kGrowth = 0.1;          // share of the window's duration between searches
 constexpr double kMostNoise = 1.25;      // largest RefinedWindow::noise_ratio
-constexpr double kFewestInFront = 0.8;   // least share of points, linear solution
-constexpr double kMostLinearPx = 3.0;    // largest RMS residual of the linear solution
-constexpr double kFewestParallaxPx = 2.0;
+constexpr double kSpeeds[] = {0.3, 1.0, 3.0, 10.0};  // m/s, at the beginning of the searches
+constexpr double kMuchWorse = 4.0;                   // times the best cost of these beginnings
+// On a street most points that last are at the horizon.
+constexpr double kFewestParallaxPx = 2.0, kParallaxQuantile = 0.8;
 constexpr double kMostAcceleration = 5.0;  // m/s², largest mean over a window
 
 /// Returns the bearing of a point, rotated to the camera's attitude at the middle row. turn_C is
@@ -33,6 +34,28 @@ constexpr double kMostAcceleration = 5.0;  // m/s², largest mean over a window
 Vector3d bearing(const ImagePoint& seen, const Vector3d& turn_C) {
   const Vector3d ray = seen.normalised.homogeneous().normalized();
   return turn_C.isZero(0.0) ? ray : Vector3d(expQuaternion(seen.row * turn_C) * ray);
+}
+
+/// Frames of the window, and the inertial increments from the first of them, in B0.
+struct Keyframes {
+  std::vector<const TrackedFrame*> tracked;
+  std::vector<TimePoint> times;
+  std::vector<double> t;  ///< s since the first
+  std::vector<Matrix3d> R;
+  std::vector<Vector3d> dp, dv;
+};
+
+void addIncrements(Keyframes& k, const ImuBuffer& imu, const Vector3d& gyro_bias,
+                   const ImuNoise& noise) {
+  k.t = {0.0}, k.R = {Matrix3d::Identity()}, k.dp = k.dv = {Vector3d::Zero()};
+  for (std::size_t i = 1; i < k.times.size(); ++i) {
+    const ImuIncrement x =
+        integrate(imu.between(k.times[0], k.times[i]), gyro_bias, Vector3d::Zero(), noise);
+    k.t.push_back(x.dt);
+    k.R.push_back(x.dq.toRotationMatrix());
+    k.dp.push_back(x.dp);
+    k.dv.push_back(x.dv);
+  }
 }
 
 /// Points of a keyframe, and the rotation vector of the first camera during read-out.
@@ -62,6 +85,7 @@ std::vector<Vector3d> ratesAt(const std::vector<TimePoint>& times, const ImuBuff
 
 /// Matches between two times, as bearings of one camera, and the rotation between them.
 struct BearingPair {
+  std::size_t from = 0, to = 0;                         ///< keyframes
   std::vector<std::pair<Vector3d, Vector3d>> bearings;  ///< unit vectors in C
   Matrix3d R_B0_B1;                                     ///< rotation with zero bias
   Matrix3d J_bias;  ///< derivative of R_B0_B1 (right tangent) by the gyro bias
@@ -139,6 +163,30 @@ BearingPair pairOf(const Bearings& from, const Bearings& to, const ImuIncrement&
   return pair;
 }
 
+/// Returns the pairs of keyframes with enough matches. Long spans constrain the bias well, and
+/// there are many short spans. Appends the displacements of all matches, in pixels, to `moved`.
+std::vector<BearingPair> pairsOf(const Keyframes& k, const ImuBuffer& imu,
+                                 const std::vector<CameraModel>& cameras, const Options& options,
+                                 std::vector<double>& moved) {
+  const std::vector<Vector3d> rates = ratesAt(k.times, imu, cameras, Vector3d::Zero());
+  const double readout_s = cameras[0].calibration().readout_s;
+  std::vector<Bearings> bearings;
+  for (std::size_t i = 0; i < k.times.size(); ++i) {
+    bearings.push_back({k.tracked[i], readout_s * (cameras[0].T_BC().q.conjugate() * rates[i])});
+  }
+  std::vector<BearingPair> pairs;
+  for (const std::size_t span : {1u, 3u, 6u}) {
+    for (std::size_t i = 0; i + span < k.times.size(); ++i) {
+      const ImuIncrement x = integrate(imu.between(k.times[i], k.times[i + span]), Vector3d::Zero(),
+                                       Vector3d::Zero(), options.imu);
+      BearingPair pair = pairOf(bearings[i], bearings[i + span], x, moved);
+      pair.from = i, pair.to = i + span;
+      if (pair.bearings.size() >= kFewestTracks) pairs.push_back(std::move(pair));
+    }
+  }
+  return pairs;
+}
+
 /// Returns the tracks with at least three views, the longest first.
 std::vector<WindowPoint> windowPoints(const std::vector<const TrackedFrame*>& tracked,
                                       const std::vector<CameraModel>& cameras) {
@@ -161,6 +209,55 @@ std::vector<WindowPoint> windowPoints(const std::vector<const TrackedFrame*>& tr
   stableSortBy(points, [](const WindowPoint& p) { return -static_cast<double>(p.views.size()); });
   if (points.size() > kMostPoints) points.resize(kMostPoints);
   return points;
+}
+
+/// Returns the pairs with their rays rotated to B0.
+std::vector<PathPair> pathPairs(const Keyframes& k, const std::vector<BearingPair>& pairs,
+                                const Matrix3d& R_BC) {
+  std::vector<PathPair> result;
+  for (const BearingPair& p : pairs) {
+    PathPair& pair = result.emplace_back(PathPair{p.from, p.to, {}});
+    for (const auto& [f0, f1] : p.bearings) {
+      pair.rays.emplace_back(k.R[p.from] * (R_BC * f0), k.R[p.to] * (R_BC * f1));
+    }
+  }
+  return result;
+}
+
+/// Returns initial values for the search, one for each of kSpeeds that explains the planes about as
+/// well as the best of them.
+std::vector<MotionWindow> beginningsOf(const Keyframes& k, const std::vector<BearingPair>& pairs,
+                                       const Vector3d& gyro_bias,
+                                       const std::vector<CameraModel>& cameras,
+                                       const Options& options) {
+  std::vector<PathFrame> frames;
+  for (std::size_t i = 0; i < k.t.size(); ++i) {
+    frames.push_back({k.t[i], k.R[i] * cameras[0].T_BC().p, k.dp[i]});
+  }
+  const std::vector<PathPair> path_pairs = pathPairs(k, pairs, cameras[0].T_BC().R());
+  const double sigma = options.vision.sigma_px / cameras[0].fx();
+  const Vector3d against_force = -options.gravity * k.dv.back().normalized();
+  const std::vector<WindowPoint> points = windowPoints(k.tracked, cameras);
+  std::vector<Path> paths;
+  for (const double speed : kSpeeds) {
+    paths.push_back(pathWithSpeed(speed, frames, path_pairs, against_force, sigma));
+  }
+  stableSortBy(paths, [](const Path& p) { return p.cost; });
+  std::vector<MotionWindow> beginnings;
+  for (const Path& path : paths) {
+    if (path.cost > kMuchWorse * paths[0].cost) break;
+    MotionWindow& w = beginnings.emplace_back();
+    w.gyro_bias = gyro_bias;
+    w.gravity_B0 = path.gravity;
+    for (std::size_t i = 0; i < k.t.size(); ++i) {
+      const double t = k.t[i];
+      w.poses.push_back({k.times[i], k.R[i], path.v0 * t + 0.5 * t * t * path.gravity + k.dp[i],
+                         path.v0 + t * path.gravity + k.dv[i]});
+    }
+    w.points = points;
+    placePoints(w);
+  }
+  return beginnings;
 }
 
 /// Returns the state at the newest pose after a correction by the error [θ, v, gravity, b_g, b_a].
@@ -228,6 +325,10 @@ Result<Start> MotionInitialiser::start(const ImuBuffer& imu,
   failed_.reset();
   if (!result) {
     failed_ = result.error();
+    // Tracks of fast motion are shorter than the window.
+    if (failed_->code == "start_few_tracks") {
+      frames_.erase(frames_.begin(), frames_.begin() + static_cast<long>(frames_.size() / 2));
+    }
     const double window_s = toSeconds(now - frames_.front().time);
     next_attempt_ = now + durationFromSeconds(kGrowth * window_s);
   }
@@ -240,76 +341,28 @@ Result<Start> MotionInitialiser::attempt(const ImuBuffer& imu,
       toSeconds(frames_.back().time - frames_.front().time) < kShortestWindow) {
     return fail("start_window_short");
   }
+  Keyframes k;
   const std::size_t count = std::min(kKeyframes, frames_.size());
-  std::vector<const TrackedFrame*> tracked;
-  std::vector<TimePoint> times;
   for (std::size_t i = 0; i < count; ++i) {
     const Seen& s = frames_[i * (frames_.size() - 1) / (count - 1)];
-    tracked.push_back(&s.tracked);
-    times.push_back(s.time);
+    k.tracked.push_back(&s.tracked);
+    k.times.push_back(s.time);
   }
-  const std::vector<Vector3d> raw_rates = ratesAt(times, imu, cameras, Vector3d::Zero());
-  std::vector<Bearings> bearings;
-  for (std::size_t i = 0; i < count; ++i) {
-    const double readout_s = cameras[0].calibration().readout_s;
-    bearings.push_back({tracked[i], readout_s * (cameras[0].T_BC().q.conjugate() * raw_rates[i])});
-  }
-  std::vector<BearingPair> pairs;
   std::vector<double> moved;
-  // Long spans constrain the bias well, and there are many short spans.
-  for (const std::size_t span : {1u, 3u, 6u}) {
-    for (std::size_t i = 0; i + span < count; ++i) {
-      const ImuIncrement x = integrate(imu.between(times[i], times[i + span]), Vector3d::Zero(),
-                                       Vector3d::Zero(), options_.imu);
-      BearingPair pair = pairOf(bearings[i], bearings[i + span], x, moved);
-      if (pair.bearings.size() >= kFewestTracks) pairs.push_back(std::move(pair));
-    }
-  }
+  const std::vector<BearingPair> pairs = pairsOf(k, imu, cameras, options_, moved);
   if (pairs.size() < count) return fail("start_few_tracks");
-  std::nth_element(moved.begin(), moved.begin() + static_cast<long>(moved.size() / 2), moved.end());
-  if (moved[moved.size() / 2] < kFewestParallaxPx) return fail("start_no_parallax");
+  const auto usual = moved.begin() + static_cast<long>(kParallaxQuantile * moved.size());
+  std::nth_element(moved.begin(), usual, moved.end());
+  if (*usual < kFewestParallaxPx) return fail("start_no_parallax");
   const Vector3d gyro_bias = gyroBiasFromPairs(pairs, cameras[0].T_BC().R());
-
-  const std::vector<Vector3d> rates = ratesAt(times, imu, cameras, gyro_bias);
-  std::vector<Keyframe> keyframes;
-  for (std::size_t i = 0; i < count; ++i) {
-    Keyframe k{0.0, Matrix3d::Identity(), Vector3d::Zero(), Vector3d::Zero(), tracked[i], rates[i]};
-    if (i > 0) {
-      const ImuIncrement x =
-          integrate(imu.between(times[0], times[i]), gyro_bias, Vector3d::Zero(), options_.imu);
-      k = {x.dt, x.dq.toRotationMatrix(), x.dp, x.dv, tracked[i], rates[i]};
-    }
-    keyframes.push_back(k);
-  }
-  const double mean_force = keyframes.back().dv.norm() / keyframes.back().t;
+  addIncrements(k, imu, gyro_bias, options_.imu);
+  const double mean_force = k.dv.back().norm() / k.t.back();
   if (std::abs(mean_force - options_.gravity) > kMostAcceleration) {
     return fail("start_force_not_gravity");
   }
-  const Views views = viewsOf(keyframes, cameras);
-  if (views.size() < kFewestTracks) return fail("start_few_tracks");
-  std::map<std::uint64_t, PointEstimate> estimates;
-  LinearStart s;
-  s.x.setZero();
-  for (int i = 0; i < 4; ++i) s = solveOnce(views, estimates, s.x, options_.gravity);
-  if (!s.x.allFinite() || s.in_front < kFewestInFront || s.rms_px > kMostLinearPx) {
-    // The linear solution is unusable. The search begins at rest, with gravity opposite to the mean
-    // force.
-    s.x.setZero();
-    s.x.tail<3>() = -options_.gravity * keyframes.back().dv.normalized();
-  }
-
-  MotionWindow window;
-  window.gyro_bias = gyro_bias;
-  window.gravity_B0 = s.x.tail<3>();
-  for (std::size_t i = 0; i < count; ++i) {
-    const Keyframe& k = keyframes[i];
-    window.poses.push_back({times[i], k.R,
-                            s.x.head<3>() * k.t + 0.5 * k.t * k.t * s.x.tail<3>() + k.dp,
-                            s.x.head<3>() + k.t * s.x.tail<3>() + k.dv});
-  }
-  window.points = windowPoints(tracked, cameras);
-  placePoints(window);
-  const auto refined = searchMinimum(std::move(window), imu, options_);
+  std::vector<MotionWindow> beginnings = beginningsOf(k, pairs, gyro_bias, cameras, options_);
+  if (beginnings[0].points.size() < kFewestTracks) return fail("start_few_tracks");
+  const auto refined = searchMinimum(std::move(beginnings), imu, options_);
   if (!refined) return tl::unexpected(refined.error());
   if (refined->noise_ratio > kMostNoise) return fail("start_inconsistent");
   Start start = startOf(*refined, options_);

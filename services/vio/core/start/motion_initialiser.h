@@ -1,5 +1,5 @@
 // Start in motion from images and samples. The gyro bias is estimated from epipolar normals,
-// velocity and gravity linearly (linear_start.h), then all of them jointly (motion_refinement.h).
+// the path from the same planes (motion_path.h), then all of them jointly (motion_refinement.h).
 #pragma once
 
 #include <deque>

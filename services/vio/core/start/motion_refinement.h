@@ -70,7 +70,7 @@ void placePoints(MotionWindow& window);
 
 /// Returns the best minimum. Fails as refine() does, and with "start_unobservable" if another
 /// minimum with a different velocity fits about as well.
-Result<RefinedWindow> searchMinimum(MotionWindow window, const ImuBuffer& imu,
+Result<RefinedWindow> searchMinimum(std::vector<MotionWindow> beginnings, const ImuBuffer& imu,
                                     const Options& options);
 
 }  // namespace perdure::vio

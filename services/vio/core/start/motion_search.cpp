@@ -12,21 +12,11 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kUsualDepth = 3.0;  // m
-constexpr double kAsLikely = 9.0;    // largest difference in cost of minima that fit about as well
-constexpr double kSame = 0.01;       // largest relative difference in velocity of equal minima
+constexpr double kAsLikely = 9.0;  // largest difference in cost of minima that fit about as well
+constexpr double kSame = 0.01;     // largest relative difference in velocity of equal minima
 // The residuals do not contain the part of a view's error that is constant along its track.
 constexpr double kNoiseMargin = 1.2;
 constexpr double kLeastNoise = 0.25;  // least noise, as a share of vision.sigma_px
-
-/// Places all points at the depth `depth`, in m, of the camera of their first view.
-void placeAt(MotionWindow& window, double depth) {
-  for (WindowPoint& point : window.points) {
-    const WindowView& v = point.views.front();
-    const WindowPose& pose = window.poses[v.keyframe];
-    point.p_B0 = pose.p_B0 + pose.R_B0_B * (v.p_BC + depth * (v.R_BC * v.normalised.homogeneous()));
-  }
-}
 
 const Vector3d& velocity(const RefinedWindow& minimum) { return minimum.window.poses.back().v_B0; }
 
@@ -97,14 +87,10 @@ void placePoints(MotionWindow& window) {
   }
 }
 
-Result<RefinedWindow> searchMinimum(MotionWindow window, const ImuBuffer& imu,
+Result<RefinedWindow> searchMinimum(std::vector<MotionWindow> beginnings, const ImuBuffer& imu,
                                     const Options& options) {
-  // A second search begins with all points at the usual depth, because the linear solution may be
-  // degenerate.
-  MotionWindow usual = window;
-  placeAt(usual, kUsualDepth);
-  MotionWindow resting = window;
-  auto minima = refineAll({std::move(window), std::move(usual)}, imu, options);
+  MotionWindow resting = beginnings.front();
+  auto minima = refineAll(std::move(beginnings), imu, options);
   if (!minima) return tl::unexpected(minima.error());
   if (turnMovesCameras(minima->front().window)) {
     for (WindowPose& pose : resting.poses) pose.p_B0.setZero(), pose.v_B0.setZero();

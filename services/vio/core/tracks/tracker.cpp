@@ -1,6 +1,7 @@
 #include "services/vio/core/tracks/tracker.h"
 
 #include <cmath>
+#include <limits>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
@@ -14,6 +15,7 @@ namespace perdure::vio {
 namespace {
 
 constexpr double kBorder = 4.0;
+constexpr double kLost = std::numeric_limits<double>::infinity();
 constexpr double kStill = 0.5;           // px, largest motion of a point at rest
 constexpr std::size_t kFewestStill = 8;  // least number of points at rest
 constexpr double kLeastSpreadOfStill =
@@ -334,12 +336,12 @@ std::optional<double> Tracker::motionSince(std::size_t frames, double quantile) 
   constexpr std::size_t kFewest = 10;
   if (frames == 0 || history_.size() <= frames) return std::nullopt;
   const auto& before = history_[history_.size() - 1 - frames];
-  std::vector<float> motion;
-  auto it = before.begin();
-  for (const auto& [id, pixel] : history_.back()) {  // both in order of rising id
-    while (it != before.end() && it->first < id) ++it;
-    if (it == before.end()) break;
-    if (it->first == id) motion.push_back(static_cast<float>(cv::norm(pixel - it->second)));
+  std::vector<double> motion;
+  auto it = history_.back().begin();
+  for (const auto& [id, pixel] : before) {  // both in order of rising id
+    while (it != history_.back().end() && it->first < id) ++it;
+    const bool seen = it != history_.back().end() && it->first == id;
+    motion.push_back(seen ? cv::norm(it->second - pixel) : kLost);
   }
   if (motion.size() < kFewest) return std::nullopt;
   const auto at = static_cast<long>(quantile * static_cast<double>(motion.size()));

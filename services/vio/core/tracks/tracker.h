@@ -48,8 +48,10 @@ class Tracker {
                      const std::optional<Eigen::Matrix3d>& R_now_before,
                      const std::vector<cv::Rect2f>& masked = {},
                      const Eigen::Vector3d& turn_of_readout = Eigen::Vector3d::Zero());
-  /// Returns a quantile of the points' image motion, in px, over the last `frames` frames; nothing
-  /// if there are too few frames, or fewer than ten points.
+  /// Returns a quantile of the image motion, in px, over the last `frames` frames, of the points
+  /// that were tracked before; infinite if that many of them were lost. A moving camera soon loses
+  /// the near points and keeps those at the horizon. Returns nothing if there are too few frames,
+  /// or if fewer than ten points were tracked.
   std::optional<double> motionSince(std::size_t frames, double quantile = 0.5) const;
   /// Returns the share of points that have moved less than half a pixel for `frames` images; 0 if
   /// these are fewer than eight or close together.

@@ -5,8 +5,8 @@
 #include <optional>
 
 #include "common/math/so3.h"
-#include "services/vio/core/start/linear_start.h"
 #include "services/vio/core/start/motion_initialiser.h"
+#include "services/vio/core/start/motion_path.h"
 #include "tests/services/vio/simulated_drive.h"
 
 namespace perdure::vio {
