@@ -24,7 +24,7 @@ constexpr double kShortestWindow = 0.2;  // s
 constexpr double kGrowth = 0.1;          // share of the window's duration between searches
 constexpr double kMostNoise = 1.25;      // largest RefinedWindow::noise_ratio
 constexpr double kSpeeds[] = {0.3, 1.0, 3.0, 10.0};  // m/s, at the beginning of the searches
-constexpr double kMuchWorse = 4.0;                   // times the best cost of these beginnings
+constexpr double kMuchWorse = 100.0;  // cost above that of the best of these beginnings
 // On a street most points that last are at the horizon.
 constexpr double kFewestParallaxPx = 2.0, kParallaxQuantile = 0.8;
 constexpr double kMostAcceleration = 5.0;  // m/s², largest mean over a window
@@ -245,7 +245,7 @@ std::vector<MotionWindow> beginningsOf(const Keyframes& k, const std::vector<Bea
   stableSortBy(paths, [](const Path& p) { return p.cost; });
   std::vector<MotionWindow> beginnings;
   for (const Path& path : paths) {
-    if (path.cost > kMuchWorse * paths[0].cost) break;
+    if (path.cost > paths[0].cost + kMuchWorse) break;
     MotionWindow& w = beginnings.emplace_back();
     w.gyro_bias = gyro_bias;
     w.gravity_B0 = path.gravity;

@@ -4,7 +4,6 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <cmath>
 
 #include "services/vio/core/start/motion_refinement.h"
 
@@ -18,7 +17,8 @@ using Matrix5 = Eigen::Matrix<double, 5, 5>;
 
 constexpr int kPasses = 6;
 constexpr double kTurnOfGravity = 0.15;  // rad, deviation; a mean acceleration of 1.5 m/s²
-constexpr double kTail = 9.0;            // residuals above three deviations count little
+constexpr double kMostParallax = 5.0;
+constexpr double kTail = 9.0;  // residuals above three deviations count little
 
 /// Motion of the camera between the keyframes of a pair: known + by_x · x.
 struct PairMotion {
@@ -40,17 +40,19 @@ struct Rows {
   double cost = 0.0;
 };
 
-/// Adds the rows n · motion = 0 of a pair, in deviations of a ray, weighted robustly.
+/// Adds the rows n · motion = 0 of a pair, in deviations of a ray, weighted robustly. Before the
+/// first solution (x = 0) a row's weight is that of its largest possible residual.
 void addPair(Rows& rows, const PathPair& pair, const PairMotion& m, const Unknowns& x,
              double least_m, double sigma) {
   const Vector3d motion = m.known + m.by_x * x;
   const double scale = 1.0 / (sigma * std::max(motion.norm(), least_m));
   for (const auto& [first, second] : pair.rays) {
     const Vector3d n = first.cross(second);
-    const double r = scale * n.dot(motion), weight = 1.0 / (1.0 + r * r / kTail);
+    const double r = x.isZero(0.0) ? n.norm() / sigma : scale * n.dot(motion);
+    const double near = 1.0 / (1.0 + r * r / kTail), weight = x.isZero(0.0) ? near : near * near;
     const Unknowns a = scale * m.by_x.transpose() * n;
     rows.N += weight * a * a.transpose();
-    rows.cost += kTail * std::log1p(r * r / kTail);
+    rows.cost += r * r * near;
     rows.y -= weight * scale * n.dot(m.known) * a;
   }
 }
@@ -69,13 +71,15 @@ Unknowns solve(const Rows& rows, double speed) {
   return x;
 }
 
-/// Returns the sum over the points of their parallax, negative for points behind the first camera.
-double inFront(const PathPair& pair, const Vector3d& motion) {
+/// Returns the sum of the points' parallaxes, in deviations up to kMostParallax; those of points
+/// behind the first camera are negative.
+double inFront(const PathPair& pair, const Vector3d& motion, double sigma) {
   double sum = 0.0;
   for (const auto& [first, second] : pair.rays) {
-    sum += motion.cross(second).dot(first.cross(second));
+    const Vector3d across = motion.cross(second).normalized();
+    sum += std::clamp(across.dot(first.cross(second)) / sigma, -kMostParallax, kMostParallax);
   }
-  return sum / std::max(motion.norm(), 1e-9);
+  return sum;
 }
 
 }  // namespace
@@ -99,7 +103,7 @@ Path pathWithSpeed(double speed, const std::vector<PathFrame>& frames,
   // The planes do not tell forwards from backwards; the depths do.
   double in_front = 0.0;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    in_front += inFront(pairs[i], motions[i].known + motions[i].by_x * x);
+    in_front += inFront(pairs[i], motions[i].known + motions[i].by_x * x, sigma);
   }
   if (in_front < 0.0) x.head<3>() *= -1.0;
   const double turn = x.tail<2>().squaredNorm() / (kTurnOfGravity * kTurnOfGravity);

@@ -6,7 +6,6 @@
 
 #include "common/math/so3.h"
 #include "services/vio/core/start/motion_initialiser.h"
-#include "services/vio/core/start/motion_path.h"
 #include "tests/services/vio/simulated_drive.h"
 
 namespace perdure::vio {
@@ -83,20 +82,6 @@ TEST(StartWithSpeed, LevelsInSpiteOfAccelerationAndTurn) {
   ASSERT_TRUE(start) << start.error().code;
   EXPECT_LT(std::acos((start->nav.q_WB * Vector3d::UnitZ()).z()), 0.05);
   EXPECT_NEAR(start->nav.v_WB.norm(), 10.0, 1e-9);
-}
-
-TEST(MotionStart, SolvesForTheMinimumOnASphere) {
-  const Eigen::Matrix3d M = Vector3d(1.0, 4.0, 0.5).asDiagonal();
-  const Vector3d d(3.0, -2.0, 5.0);
-  const Vector3d best = solveOnSphere(M, d, 2.0);
-  EXPECT_NEAR(best.norm(), 2.0, 1e-9);
-  const auto cost = [&](const Vector3d& g) { return 0.5 * g.dot(M * g) - d.dot(g); };
-  std::mt19937 random(3);
-  std::normal_distribution<double> n;
-  for (int i = 0; i < 1000; ++i) {
-    const Vector3d other = 2.0 * Vector3d(n(random), n(random), n(random)).normalized();
-    EXPECT_LE(cost(best), cost(other) + 1e-9);
-  }
 }
 
 Result<Start> motionStart(bool stereo, unsigned seed, double at, Nav& truth) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <random>
 
@@ -77,6 +78,20 @@ TEST(Tracker, FollowsAShiftedImageToATenthOfAPixel) {
   ASSERT_TRUE(tracker.motionSince(1));
   EXPECT_NEAR(*tracker.motionSince(1), std::hypot(3.3, 2.1), 0.05);
   EXPECT_FALSE(tracker.motionSince(2));
+}
+
+// On a street only the points at the horizon are followed for long, and they do not move.
+TEST(Tracker, LostPointsCountAsMoved) {
+  Tracker tracker(TrackerOptions{}, {CameraModel(test::testCamera(0))});
+  const cv::Mat image = texture();
+  cv::Mat next = test::texture(5);
+  const cv::Rect horizon(0, 140, image.cols, 120);
+  image(horizon).copyTo(next(horizon));
+  const std::size_t all = tracker.track(image, {}, {}).points.size();
+  tracker.track(next, {}, {});
+  ASSERT_GT(all, 100u);
+  EXPECT_LT(tracker.motionSince(1, 0.05).value(), 0.1);
+  EXPECT_TRUE(std::isinf(*tracker.motionSince(1)));
 }
 
 /// Returns the image of a camera with rotation R_C(row) at the time of each row, −½ … ½.
