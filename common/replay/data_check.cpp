@@ -178,6 +178,22 @@ double shareOfChanges(const std::vector<ImuSample>& samples, const Run& run, Eig
   return static_cast<double>(changes) / static_cast<double>(run.count());
 }
 
+/// Whether the value of a run is the sensor's limit: the axis is never beyond it. An axis that
+/// never changes is at its limit if too little is left of gravity.
+bool isLimit(const std::vector<ImuSample>& samples, const Run& run, Eigen::Index axis) {
+  constexpr double kLeast_m_s2 = 9.4;
+  const double value = axisValue(samples[run.first], axis);
+  if (run.count() == samples.size()) {
+    std::vector<double> forces;
+    for (const ImuSample& sample : samples) forces.push_back(sample.accel.norm());
+    const double force = medianOf(std::move(forces));
+    return force < kLeast_m_s2 && 2.0 * std::abs(value) > force;
+  }
+  return value != 0.0 && std::ranges::all_of(samples, [&](const ImuSample& sample) {
+           return std::copysign(1.0, value) * axisValue(sample, axis) <= std::abs(value);
+         });
+}
+
 /// Whether the axis has few different values outside of a run, although it changes there.
 bool isCoarse(const std::vector<ImuSample>& samples, const Run& run, Eigen::Index axis) {
   constexpr std::size_t kFew = 64;
@@ -202,13 +218,18 @@ void checkStuckAxes(const std::vector<ImuSample>& samples, DataFindings& finding
         (axis < 3 && run.count() == samples.size()) || isCoarse(samples, run, axis) ||
         shareOfChanges(samples, run, axis) < kChanges)
       continue;
+    const bool limit = isLimit(samples, run, axis);
     findings.push_back(
-        {Grade::kWarning, "imu_axis_stuck",
-         fmt::format("the {} reads exactly {:.6g} {} along {} {}, while its other axes change: "
-                     "this axis is off, saturated, has failed, or its column was not recorded; {}",
-                     sensorOf(axis), axisValue(samples[run.first], axis), unitOf(axis),
-                     "xyz"[axis % 3], placeOf(run, samples),
-                     run.count() == samples.size() ? "record again" : "cut the drive there")});
+        {Grade::kWarning, limit ? "imu_saturated" : "imu_axis_stuck",
+         fmt::format("the {} reads exactly {:.6g} {} along {} {}{}", sensorOf(axis),
+                     axisValue(samples[run.first], axis), unitOf(axis), "xyz"[axis % 3],
+                     placeOf(run, samples),
+                     limit ? " and never more: it is saturated; set a larger range of the sensor"
+                     : run.count() == samples.size()
+                         ? ", while its other axes change: this axis is off, has failed, or its "
+                           "column was not recorded; record again"
+                         : ", while its other axes change: this axis is off, has failed, or its "
+                           "column was not recorded; cut the drive there")});
   }
 }
 

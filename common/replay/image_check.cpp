@@ -136,6 +136,7 @@ bool isFlat(const cv::Mat& image) {
 struct Looked {
   std::size_t tried = 0, unreadable = 0, other_size = 0, flat = 0;
   std::string size, first_unreadable, why;
+  const Recording::FrameFile *right = nullptr, *other = nullptr;  ///< first ones of either size
 };
 
 Looked lookAt(const FileList& some, const CameraCalibration& calibration) {
@@ -155,10 +156,68 @@ Looked lookAt(const FileList& some, const CameraCalibration& calibration) {
       ++looked.other_size;
       const auto whole = monoImageOf(*file);
       if (whole) looked.size = fmt::format("{}x{}", whole->cols, whole->rows);
+      if (looked.other == nullptr) looked.other = file;
+    } else if (looked.right == nullptr) {
+      looked.right = file;
     }
     looked.flat += isFlat(*image) ? 1 : 0;
   }
   return looked;
+}
+
+/// Correlation of the grey values of two images of the same size.
+double correlationOf(const cv::Mat& a, const cv::Mat& b) {
+  cv::Mat result;
+  cv::matchTemplate(a, b, result, cv::TM_CCOEFF_NORMED);
+  return result.at<float>(0, 0);
+}
+
+/// Adds images_inverted if the middle image is the negative of both neighbours.
+void checkInverted(const FileList& all, const CameraCalibration& calibration,
+                   DataFindings& findings) {
+  constexpr std::uint32_t kColumns = 160;
+  constexpr double kClearly = 0.5;
+  if (all.size() < 3 || all.front()->load) return;
+  std::vector<cv::Mat> images;
+  for (std::size_t i = all.size() / 2 - 1; images.size() < 3; ++i) {
+    const auto image = monoImageOf(*all[i], reductionFor(calibration, kColumns));
+    if (!image || (!images.empty() && image->size() != images.front().size())) return;
+    images.push_back(*image);
+  }
+  if (correlationOf(images[0], images[1]) > -kClearly ||
+      correlationOf(images[1], images[2]) > -kClearly ||
+      correlationOf(images[0], images[2]) < kClearly)
+    return;
+  findings.push_back({ImageGrade::kWarning, "images_inverted",
+                      fmt::format("image {} of {} is the negative of the one before and of the one "
+                                  "after it: invert the grey values of every second image (255 - "
+                                  "value)",
+                                  nameIn(*all[all.size() / 2]), calibration.name)});
+}
+
+/// Adds images_change_size: finds the first image whose size differs from its predecessor's.
+void addChangeOfSize(const FileList& all, const Looked& looked,
+                     const CameraCalibration& calibration, DataFindings& findings) {
+  constexpr std::uint32_t kColumns = 340;
+  const int factor = reductionFor(calibration, kColumns);
+  const auto isRight = [&](const Recording::FrameFile* file) {
+    const auto image = monoImageOf(*file, factor);
+    return image && isOfCamera(*image, factor, calibration);
+  };
+  const bool before = looked.right->time < looked.other->time;
+  const auto from = std::ranges::find(all, before ? looked.right : looked.other),
+             to = std::ranges::find(all, before ? looked.other : looked.right);
+  const auto changed =
+      std::partition_point(from, to, [&](const auto* file) { return isRight(file) == before; });
+  const std::string own = fmt::format("{}x{}", calibration.width, calibration.height);
+  findings.push_back(
+      {ImageGrade::kWarning, "images_change_size",
+       fmt::format("the images of {} change from {} to {} at frame {} of {} ({}, {} ns); {} of {} "
+                   "that were tried are {}, which cannot be used: cut the drive there, or scale "
+                   "these images",
+                   calibration.name, before ? own : looked.size, before ? looked.size : own,
+                   changed - all.begin(), all.size(), nameIn(**changed),
+                   toNanoseconds((*changed)->time), looked.other_size, looked.tried, looked.size)});
 }
 
 }  // namespace
@@ -195,12 +254,15 @@ void checkImages(const Recording& recording, std::size_t camera, DataFindings& f
              "the images of {} are {}, its calibration is for {}x{}: set `resolution` (width, "
              "height) where it was only written wrongly, or calibrate at the images' size",
              calibration.name, looked.size, calibration.width, calibration.height)});
+  } else if (looked.right != nullptr && looked.other_size > 1) {
+    addChangeOfSize(listed.whole, looked, calibration, findings);
   } else if (looked.flat == looked.tried) {
     findings.push_back(
         {ImageGrade::kWarning, "image_flat",
          fmt::format("the images of {} are of one grey: see exposure, lens cap and bit depth",
                      calibration.name)});
   }
+  checkInverted(listed.whole, calibration, findings);
 }
 
 Result<cv::Mat> monoImageOf(const Recording::FrameFile& file, int reduce) {

@@ -36,7 +36,7 @@ const std::vector<Layers> kLayers{
     {"tools/bus_tools/", {"", "status", "doctor"}},
     {"tools/calibrate/", {"estimate", "motion", ""}},
     {"tools/evaluate/", {"", "memory"}},
-    {"tools/outputs/", {"frames", "pictures", ""}},
+    {"tools/outputs/", {"frames", "pictures", "boxes", ""}},
     {"tools/simulate/", {"shapes", "render", ""}}};
 
 std::string part(const std::string& path, std::size_t index) {

@@ -98,6 +98,19 @@ TurnPairs pairsInBody(const std::vector<Turn>& turns, const std::vector<ImuSampl
   return {images, said};
 }
 
+/// The other explanation if the images turn `shown` times as much about an axis of the body: other
+/// pixels per angle along one axis of the image.
+std::string squeezeText(const CameraCalibration& camera, Eigen::Index axis, double shown) {
+  constexpr double kAlong = 0.8;
+  const Eigen::Vector3d axis_C = camera.T_BC.q.conjugate() * Eigen::Vector3d::Unit(axis);
+  const bool along_x = std::abs(axis_C.y()) > kAlong;
+  if (!along_x && std::abs(axis_C.x()) < kAlong) return {};
+  return fmt::format(
+      ", or whether the images are squeezed or stretched along {0}: f{0} = {1:.0f} px "
+      "would fit",
+      along_x ? "x" : "y", shown * (along_x ? camera.fx : camera.fy));
+}
+
 constexpr std::size_t kFewestPairs = 12;
 
 }  // namespace
@@ -166,8 +179,9 @@ replay::DataFindings judgeAxisFactors(const std::vector<Turn>& turns,
     if (!seen || shown <= 0.0 || std::abs(shown - 1.0) < least) continue;
     return {{replay::DataFinding::Grade::kWarning, "gyro_axis_factor",
              fmt::format("the gyroscope's w_{} is {:.2f} times the turning about this axis that {} "
-                         "shows, in {} pairs of images: see the scale of this column",
-                         "xyz"[i], 1.0 / shown, camera.name, pairs.count())}};
+                         "shows, in {} pairs of images: see the scale of this column{}",
+                         "xyz"[i], 1.0 / shown, camera.name, pairs.count(),
+                         squeezeText(camera, i, shown))}};
   }
   return {};
 }

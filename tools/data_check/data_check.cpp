@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <opencv2/core.hpp>
 
@@ -16,7 +17,10 @@
 #include "tools/data_check/pair_check.h"
 #include "tools/data_check/poses/pose_check.h"
 #include "tools/data_check/rig_numbers.h"
+#include "tools/data_check/samples/mean_force.h"
+#include "tools/data_check/samples/sample_blocks.h"
 #include "tools/data_check/stereo/stereo_check.h"
+#include "tools/data_check/turn_integral.h"
 
 namespace perdure::tools {
 
@@ -56,6 +60,7 @@ bool surelyAgree(const std::vector<Turn>& turns, const std::vector<ImuSample>& s
          judgeAxisFactors(turns, samples, camera).empty();
 }
 
+constexpr std::size_t kFirst = 36;
 constexpr std::size_t kMany = 120;  // an axis with little rotation needs more pairs
 
 /// Checks the axes before it reports `found`, because mirrored axes also resemble a rotated or
@@ -83,11 +88,11 @@ replay::DataFindings checkAxes(const replay::Recording& recording,
   return judgeAxisChanges(turnsOfImages(recording, lively, kMany, &known), recording.imu, camera);
 }
 
-replay::DataFindings checkTurns(const replay::Recording& recording) {
+replay::DataFindings findingsOfTurns(const replay::Recording& recording, KnownTurns& known,
+                                     bool whole = true) {
   const CameraCalibration& camera = recording.calibration.cameras.front();
   const auto lively = livelinessOfAxes(recording.imu);
-  KnownTurns known;
-  const auto first = turnsOfImages(recording, lively, 36, &known);
+  const auto first = turnsOfImages(recording, lively, kFirst, &known);
   auto parts = offsetsOfParts(first, recording.imu, camera);
   const bool stepped = hasStampStep(recording);
   if (!stepped && !offsetsDiffer(parts, camera) && surelyAgree(first, recording.imu, camera))
@@ -97,7 +102,7 @@ replay::DataFindings checkTurns(const replay::Recording& recording) {
     return constant;
   for (const auto& part : offsetsOfParts(turns, recording.imu, camera)) parts.push_back(part);
   const bool other = disagree(turns, recording.imu, camera);
-  if (stepped || other || offsetsDiffer(parts, camera)) {
+  if (whole && (stepped || other || offsetsDiffer(parts, camera))) {
     if (auto clocks = checkClockLine(recording, parts, known); !clocks.empty()) return clocks;
   }
   const auto findings = judgeTurns(turns, recording.imu, camera);
@@ -106,6 +111,81 @@ replay::DataFindings checkTurns(const replay::Recording& recording) {
   if (unit && findings.front().code != "gyro_factor") return findings;
   const auto axes = checkAxes(recording, lively, turns, findings, known);
   return axes.empty() && other ? checkBackwards(recording, known) : axes;
+}
+
+/// The rotations of a recording, and what they show.
+struct TurnCheck {
+  /// The clocks of a part are not judged.
+  explicit TurnCheck(const replay::Recording& recording, bool whole) {
+    findings = findingsOfTurns(recording, known, whole);
+    turns = turnsOfImages(recording, livelinessOfAxes(recording.imu), kFirst, &known);
+    contradicted = disagree(turns, recording.imu, recording.calibration.cameras.front());
+  }
+  /// Whether images and gyroscope clearly turn together.
+  bool agrees(const replay::Recording& recording) const {
+    constexpr double kAgree = 0.7;  // correlation about the axis that is seen best
+    constexpr std::size_t kFewest = 20;
+    const auto found =
+        correlationOfAxes(turns, recording.imu, recording.calibration.cameras.front());
+    return findings.empty() && !contradicted && found.count >= kFewest &&
+           found.of.diagonal().maxCoeff() > kAgree;
+  }
+
+  KnownTurns known;
+  replay::DataFindings findings;
+  std::vector<Turn> turns;
+  bool contradicted = false;  ///< with or without a finding
+};
+
+/// Returns the findings of one half of the drive if the other half has none.
+replay::DataFindings judgeHalves(const replay::Recording& recording) {
+  std::array<replay::Recording, 2> halves{recording, recording};
+  const auto middle = static_cast<std::ptrdiff_t>(recording.frames.size() / 2);
+  auto &first = halves[0].frames, &second = halves[1].frames;
+  first.erase(first.begin() + middle, first.end());
+  second.erase(second.begin(), second.begin() + middle);
+  const std::array<TurnCheck, 2> checks{TurnCheck(halves[0], false), TurnCheck(halves[1], false)};
+  for (const std::size_t bad : {1, 0}) {
+    if (!checks[1 - bad].agrees(halves[1 - bad]) || checks[bad].findings.empty()) continue;
+    auto findings = checks[bad].findings;
+    findings.front().text =
+        fmt::format("something changes in mid-drive: only {} {} ns, {}; cut the drive there",
+                    bad == 1 ? "from about" : "until about", toNanoseconds(second.front().time),
+                    findings.front().text);
+    return findings;
+  }
+  return {};
+}
+
+/// Whether the rotations of one half of the drive agree with the gyroscope and the others do not.
+bool isUneven(const std::vector<Turn>& turns, const replay::Recording& recording) {
+  constexpr double kAgree = 0.15, kContradict = 0.4;
+  constexpr std::size_t kFewest = 8;
+  const CameraCalibration& camera = recording.calibration.cameras.front();
+  const TimePoint middle = recording.frames[recording.frames.size() / 2].time;
+  const Duration later = durationFromSeconds(camera.time_offset_s);
+  const TurnIntegral gyro(recording.imu);
+  std::array<std::vector<Eigen::Vector3d>, 2> images, said;
+  for (const Turn& turn : turns) {
+    if (!gyro.covers(turn.from + later, turn.to + later)) continue;
+    const std::size_t half = turn.from < middle ? 0 : 1;
+    images[half].push_back(turn.of_images);
+    said[half].push_back(gyro.between(turn.from + later, turn.to + later));
+  }
+  if (std::min(images[0].size(), images[1].size()) < kFewest) return false;
+  const Eigen::Matrix3d R_CB = camera.T_BC.R().transpose();
+  const auto [least, most] = std::minmax({TurnPairs(images[0], said[0]).unexplained(R_CB),
+                                          TurnPairs(images[1], said[1]).unexplained(R_CB)});
+  return least < kAgree && most > kContradict;
+}
+
+replay::DataFindings checkTurns(const replay::Recording& recording) {
+  const TurnCheck whole(recording, true);
+  // A clock that was set is a change already.
+  const bool clocks = !whole.findings.empty() && whole.findings.front().code.starts_with("clock_");
+  if (clocks || !isUneven(whole.turns, recording)) return whole.findings;
+  auto halves = judgeHalves(recording);
+  return halves.empty() ? whole.findings : halves;
 }
 
 }  // namespace
@@ -126,15 +206,21 @@ replay::DataFindings checkDrive(const replay::Recording& recording, const replay
   const bool paused =
       std::ranges::any_of(findings, [](const auto& one) { return one.code.starts_with("clock_"); });
   if (use.imu && !paused) add("the samples", findings, [&] { return checkImuGaps(recording); });
+  if (use.imu) add("blocks of samples", findings, [&] { return checkSampleBlocks(recording); });
   add("repeated images", findings, [&] { return checkFrozenImages(recording); });
   add("what belongs together", findings, [&] { return checkPairs(recording); });
   add("the two cameras", findings, [&] { return checkStereo(recording); });
   // With these, the rotations of images and gyroscope would differ too.
   const bool known = std::ranges::any_of(findings, [](const auto& one) {
     return one.code == "stamps_of_arrival" || one.code == "clock_set_alone" ||
-           one.code == "imu_axis_stuck" || one.code == "imu_spike";
+           one.code == "imu_axis_stuck" || one.code == "imu_spike" || one.code == "imu_block" ||
+           one.code == "imu_saturated";
   });
-  if (use.imu && !known) add("turning", findings, [&] { return checkTurns(recording); });
+  if (!use.imu || known) return findings;
+  const std::size_t before = findings.size();
+  add("turning", findings, [&] { return checkTurns(recording); });
+  if (findings.size() == before)
+    add("the force", findings, [&] { return checkMeanForce(recording.imu); });
   return findings;
 }
 

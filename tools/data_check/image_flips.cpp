@@ -48,6 +48,28 @@ std::string axesOf(const Eigen::Vector3i& signs, int sign) {
   return axes;
 }
 
+/// Half a turn of the IMU about an axis of the camera has the same signs as a flip. Returns the fix
+/// for it if gravity permits the half turn.
+std::string turnedImu(const Eigen::Vector3i& signs, const std::vector<ImuSample>& samples,
+                      const CameraCalibration& camera) {
+  constexpr double kAlong = 0.5;
+  if (axesOf(signs, 1).size() != 1) return {};
+  Eigen::Index axis = 0;
+  signs.maxCoeff(&axis);
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const ImuSample& sample : samples) sum += sample.accel;
+  const Eigen::Vector3d up_C = camera.T_BC.q.conjugate() * sum.normalized();
+  const bool upright = up_C.y() < -kAlong;  // as given; after a half turn about x or z it is not
+  if (axis != 1 && upright) return {};
+  const Eigen::Vector3d axis_B = camera.T_BC.q * Eigen::Vector3d::Unit(axis);
+  Eigen::Index of_body = 0;
+  axis_B.cwiseAbs().maxCoeff(&of_body);
+  return fmt::format(
+      "turn the IMU by 180° about its {} (as it is mounted or in T_BS), which the "
+      "turning shows equally, or ",
+      "xyz"[of_body]);
+}
+
 }  // namespace
 
 replay::DataFindings judgeFlips(const std::vector<Turn>& turns,
@@ -61,15 +83,16 @@ replay::DataFindings judgeFlips(const std::vector<Turn>& turns,
     if (fits) names += fmt::format("{}{}", names.empty() ? "" : ", or ", flip.name);
   }
   if (names.empty()) return {};
+  const std::string turned = turnedImu(signs, samples, camera);
   const std::string with = axesOf(signs, 1), unknown = axesOf(signs, 0);
   return {{replay::DataFinding::Grade::kWarning, "images_flipped",
            fmt::format(
                "the images of {} seem to be {}: about the camera's {} they turn against the "
-               "gyroscope{}{}; turn them back, or, if they are right, see T_BS and the signs of "
+               "gyroscope{}{}; turn them back, or, if they are right, {}see T_BS and the signs of "
                "the gyroscope's columns",
                camera.name, names, axesOf(signs, -1),
                with.empty() ? "" : ", about " + with + " with it",
-               unknown.empty() ? "" : " (about " + unknown + " too little to say)")}};
+               unknown.empty() ? "" : " (about " + unknown + " too little to say)", turned)}};
 }
 
 }  // namespace perdure::tools

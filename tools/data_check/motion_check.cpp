@@ -59,6 +59,13 @@ std::vector<Run> liveliestRuns(const std::vector<double>& values, std::size_t mo
     runs.emplace_back(-sum, begin);
   }
   std::sort(runs.begin(), runs.end());
+  // One run at least is of the other half of the drive, where something may have changed.
+  const auto isFirstHalf = [&](const auto& run) { return 2 * run.second < values.size(); };
+  const bool first = isFirstHalf(runs.front());
+  const auto other = std::find_if(runs.begin(), runs.end(),
+                                  [&](const auto& run) { return isFirstHalf(run) != first; });
+  if (other >= runs.begin() + kRuns && other != runs.end())
+    std::iter_swap(runs.begin() + kRuns - 1, other);
   runs.resize(std::min(runs.size(), kRuns));
   std::vector<Run> chosen;
   for (const auto& [negative, begin] : runs) chosen.emplace_back(begin, begin + length);

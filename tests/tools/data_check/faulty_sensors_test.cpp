@@ -2,8 +2,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <random>
 
 #include "tests/tools/data_check/turning_drive.h"
@@ -132,6 +134,80 @@ TEST(FaultySensors, SingleSamplesFarFromTheirNeighboursAreSpikes) {
   });
   EXPECT_THAT(findingIn(drive, "imu_spike"), HasSubstr("(and 1 more) reads 1e+05 rad/s about y"));
   EXPECT_EQ(findingIn(drive, "gyro_scale"), "none");
+}
+
+/// Changes the images of the second half.
+fs::path changedFromHalf(const std::string& name, const TurningDrive& drive,
+                         const std::function<cv::Mat(const cv::Mat&)>& change) {
+  const auto root = makeTurningDrive(name, drive);
+  std::vector<fs::path> images;
+  for (const auto& entry : fs::directory_iterator(root / "mav0/cam0/data"))
+    images.push_back(entry.path());
+  std::ranges::sort(images);
+  for (std::size_t i = images.size() / 2; i < images.size(); ++i) {
+    cv::imwrite(images[i].string(), change(cv::imread(images[i].string(), cv::IMREAD_GRAYSCALE)));
+  }
+  return root;
+}
+
+TEST(FaultySensors, ImagesThatAreMirroredFromMidDriveOnAreNamedWithTheTime) {
+  TurningDrive drive;
+  drive.seconds = 8.0;
+  const auto root = changedFromHalf("flipped_from_half", drive, [](const cv::Mat& image) {
+    cv::Mat flipped;
+    cv::flip(image, flipped, 1);
+    return flipped;
+  });
+  EXPECT_THAT(findingIn(root, "images_flipped"),
+              testing::AllOf(HasSubstr("something changes in mid-drive: only from about 100000000"),
+                             HasSubstr("mirrored left to right")));
+}
+
+TEST(FaultySensors, ImagesThatChangeTheirSizeAreNamedWithTheFrame) {
+  const auto root = changedFromHalf("size_from_half", {}, [](const cv::Mat& image) {
+    cv::Mat half;
+    cv::resize(image, half, {image.cols / 2, image.rows / 2});
+    return half;
+  });
+  EXPECT_THAT(findingIn(root, "images_change_size"),
+              HasSubstr("change from 160x120 to 80x60 at frame 20 of 4"));
+}
+
+/// A change of some samples, counted from 0.
+auto fromTo(int first, int last, const std::function<void(ImuSample&)>& change) {
+  return [=, number = 0](ImuSample& sample) mutable {
+    if (number >= first && number < last) change(sample);
+    ++number;
+  };
+}
+
+TEST(FaultySensors, ABlockOfCorruptSamplesIsNamed) {
+  TurningDrive drive;
+  drive.change = fromTo(200, 206, [](ImuSample& sample) { sample.gyro.z() = 8.0; });
+  EXPECT_THAT(findingIn(makeTurningDrive("gyro_block", drive), "imu_block"),
+              HasSubstr("gyroscope reads 8 rad/s about z in 6 samples from 1000000001000000000 ns "
+                        "(number 201)"));
+  drive.change = fromTo(100, 103, [](ImuSample& sample) { sample.accel.setConstant(80.0); });
+  EXPECT_THAT(findingIn(makeTurningDrive("accel_block", drive), "imu_block"),
+              HasSubstr("accelerometer reads 80 m/s² about x, y, z in 3 samples"));
+}
+
+TEST(FaultySensors, AShockOfBothSensorsIsNoCorruptBlock) {
+  TurningDrive drive;
+  drive.change = fromTo(200, 203, [](ImuSample& sample) {
+    sample.gyro.z() = 8.0;
+    sample.accel.x() += 70.0;
+  });
+  EXPECT_EQ(findingIn(makeTurningDrive("shock", drive), "imu_block"), "none");
+}
+
+TEST(FaultySensors, AnAxisThatIsAlwaysAtTheLimitIsSaturated) {
+  TurningDrive drive;
+  drive.change = [](ImuSample& sample) {
+    sample.accel = sample.accel.cwiseMin(9.0).cwiseMax(-9.0);
+  };
+  EXPECT_THAT(findingIn(makeTurningDrive("limit", drive), "imu_saturated"),
+              HasSubstr("reads exactly 9 m/s²"));
 }
 
 }  // namespace

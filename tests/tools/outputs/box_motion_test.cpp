@@ -171,5 +171,44 @@ TEST(BoxMotion, ShiftedAndReversedNumbersAreFound) {
   EXPECT_THAT(fixAfter([](std::int64_t k) { return 239 - k; }), HasSubstr("write 239 - number"));
 }
 
+TEST(BoxMotion, AShiftIsEstimatedWithoutBordersThatShowIt) {
+  EXPECT_THAT(doubtAfter([](const Box& b) {
+                return Box{b.x1 + 16, b.y1, std::min(319.0, b.x2 + 16), b.y2};
+              }),
+              testing::AllOf(HasSubstr("boxes are shifted"), HasSubstr("add -1")));
+}
+
+TEST(BoxMotion, AChangeInMidDriveIsNamedWithItsFrame) {
+  Frames frames = drive();
+  for (auto& [number, frame] : frames) {
+    if (number < 120) continue;
+    for (auto& [box, probability, best] : frame.detections) {
+      box = {320 - box.x2, box.y1, 320 - box.x1, box.y2};
+    }
+  }
+  const auto doubt = doubtOfBoxes(frames, camera());
+  ASSERT_TRUE(doubt);
+  EXPECT_THAT(doubt->what, HasSubstr("mirrored left to right from about frame 1"));
+}
+
+TEST(BoxMotion, DoubledNumbersAreFound) {
+  EXPECT_THAT(fixAfter([](std::int64_t k) { return 2 * k; }), HasSubstr("divide by 2"));
+}
+
+TEST(BoxMotion, FramesInDisorderAreFound) {
+  EXPECT_THAT(fixAfter([](std::int64_t k) { return k * 77 % 240; }),
+              HasSubstr("boxes do not continue from frame to frame"));
+}
+
+TEST(BoxMotion, ClassesThatChangeAtEachFrameAreFound) {
+  Frames frames = drive();
+  for (auto& [number, frame] : frames) {
+    for (auto& one : frame.detections) one.best_class = 1 + number % 3;
+  }
+  const auto doubt = doubtOfBoxes(frames, camera());
+  ASSERT_TRUE(doubt);
+  EXPECT_THAT(doubt->what, HasSubstr("classes of the boxes change"));
+}
+
 }  // namespace
 }  // namespace perdure::tools

@@ -18,6 +18,13 @@ double bestProbability(const std::vector<float>& activations) {
   return std::exp(*std::max_element(activations.begin() + 1, activations.end()) - top) / sum;
 }
 
+/// The number of the most probable class; 0 without activations.
+std::size_t bestClass(const std::vector<float>& activations) {
+  if (activations.size() < 2) return 0;
+  const auto best = std::max_element(activations.begin() + 1, activations.end());
+  return static_cast<std::size_t>(best - activations.begin());
+}
+
 }  // namespace
 
 ObjectGlance glanceAt(const ObjectBelief& object) {
@@ -68,7 +75,8 @@ void DriveLog::add(const Detections& message) {
   frame.detections.clear();
   for (const Detection& one : message.detections) {
     if (one.primed) continue;  // an answer to a prediction; the network reported no box
-    frame.detections.push_back({one.box, bestProbability(one.activations)});
+    frame.detections.push_back(
+        {one.box, bestProbability(one.activations), bestClass(one.activations)});
   }
 }
 

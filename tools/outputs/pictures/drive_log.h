@@ -33,7 +33,8 @@ ObjectGlance glanceAt(const ObjectBelief& object);
 
 struct DetectionGlance {
   Box box;
-  double probability = 0.0;  ///< probability of the best class against clutter and other classes
+  double probability = 0.0;    ///< probability of the best class against clutter and other classes
+  std::size_t best_class = 0;  ///< number of this class in its model
 };
 
 struct FrameGlance {
