@@ -34,8 +34,29 @@ void Identity::setCorrections(std::vector<Correction> corrections) {
 }
 
 bool Identity::areSeparated(TrackId a, TrackId b) const {
-  const auto at = stated_.find(std::minmax(a, b));
-  return at != stated_.end() && at->second < 0.0;
+  const auto ends = std::minmax({objectOf(a), objectOf(b)});
+  return std::ranges::any_of(stated_, [&](const auto& each) {
+    const auto& [one, other] = each.first;
+    return each.second < 0.0 && std::minmax({objectOf(one), objectOf(other)}) == ends;
+  });
+}
+
+std::set<TrackId> Identity::reachOf(TrackId a, TrackId b) const {
+  std::set<TrackId> reach{a, b};
+  if (stated_.empty()) {
+    for (const TrackId track : {a, b}) {
+      const auto& tracks = tracksOf(objectOf(track));
+      reach.insert(tracks.begin(), tracks.end());
+    }
+    return reach;
+  }
+  DisjointSets<TrackId> sets;
+  for (const SameObject& fact : facts_) sets.join(fact.a, fact.b);
+  for (const auto& [pair, nats] : stated_) sets.join(pair.first, pair.second);
+  for (const auto& [track, root] : sets.roots()) {
+    if (root == sets.rootOf(a) || root == sets.rootOf(b)) reach.insert(track);
+  }
+  return reach;
 }
 
 ObjectId Identity::observedObjectOf(TrackId track) const {

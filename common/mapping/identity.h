@@ -51,7 +51,9 @@ class Identity {
   ObjectId objectOf(TrackId track) const;
   /// Returns the object without the kSame corrections. The filter fuses these tracks only.
   ObjectId observedObjectOf(TrackId track) const;
-  /// Whether people state on the whole that the tracks are two objects.
+  /// Returns the tracks whose objects may change with a fact or correction about a and b.
+  std::set<TrackId> reachOf(TrackId a, TrackId b) const;
+  /// Whether people state on the whole that the objects of the tracks are two.
   bool areSeparated(TrackId a, TrackId b) const;
   /// Returns the tracks, by id, of an object that has several; empty for other objects.
   const std::vector<TrackId>& tracksOf(ObjectId object) const;

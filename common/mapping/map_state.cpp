@@ -203,9 +203,9 @@ void MapState::combine(ObjectId object) {
 }
 
 void MapState::unite(const SameObject& fact) {
-  const Groups before = groupsOf(fact.a, fact.b);
+  Groups before = groupsOf(fact.a, fact.b);
   identity_.add(fact);
-  regroup(before);
+  regroup(std::move(before));
 }
 
 void MapState::put(const Correction& correction) {
@@ -219,44 +219,34 @@ void MapState::put(const Correction& correction) {
   }
   Groups before;
   if (correction.aboutTwo()) before = groupsOf(correction.object, correction.other);
-  std::set<TrackId> alone;
-  for (const auto& [track, object] : before) {
-    if (!identity_.isShared(track)) alone.insert(track);
-  }
   identity_.setCorrections(std::move(all));
-  std::erase_if(before, [&](const auto& each) {
-    return alone.contains(each.first) && !identity_.isShared(each.first);
-  });
-  regroup(before);
+  regroup(std::move(before));
 }
 
 void MapState::endFactsOf(EdgeId loop) {
   Groups before;
   for (const SameObject& fact : identity_.factsOf(loop)) before.merge(groupsOf(fact.a, fact.b));
   identity_.endLoop(loop);
-  regroup(before);
+  regroup(std::move(before));
 }
 
-/// Returns all tracks of the objects to which tracks a and b belong.
+/// Returns the objects of all tracks whose objects may change with those of a and b.
 MapState::Groups MapState::groupsOf(TrackId a, TrackId b) const {
   Groups groups;
-  for (const TrackId track : {a, b}) {
-    const ObjectId object = identity_.objectOf(track);
-    groups[track] = object;
-    for (const TrackId each : identity_.tracksOf(object)) groups[each] = object;
-  }
+  for (const TrackId track : identity_.reachOf(a, b)) groups[track] = identity_.objectOf(track);
   return groups;
 }
 
 /// Moves the records of tracks that begin or cease to share an object. `before`: their objects
 /// before the change of the facts.
-void MapState::regroup(const Groups& before) {
+void MapState::regroup(Groups before) {
   std::map<ObjectId, std::size_t> sizes;
+  for (const auto& [track, object] : before) ++sizes[object];
+  std::erase_if(before, [&](const auto& each) {  // alone before and after
+    return sizes.at(each.second) == 1 && !identity_.isShared(each.first);
+  });
   std::set<ObjectId> objects;
-  for (const auto& [track, object] : before) {
-    ++sizes[object];
-    objects.insert({object, identity_.objectOf(track)});
-  }
+  for (const auto& [track, object] : before) objects.insert({object, identity_.objectOf(track)});
   for (const auto& [track, object] : before) {
     const bool was_shared = sizes.at(object) > 1, is_shared = identity_.isShared(track);
     if (was_shared != is_shared || identity_.objectOf(track) != object) regrouped_.insert(track);

@@ -87,7 +87,7 @@ class MapState {
   /// The object of each track.
   using Groups = std::map<TrackId, ObjectId>;
   Groups groupsOf(TrackId a, TrackId b) const;
-  void regroup(const Groups& before);
+  void regroup(Groups before);
   SavedAnchor savedAnchor(AnchorId id) const;
   bool isSaved(AnchorId id) const;
 

@@ -205,6 +205,7 @@ void addChangeOfSize(const FileList& all, const Looked& looked,
     return image && isOfCamera(*image, factor, calibration);
   };
   const bool before = looked.right->time < looked.other->time;
+  if (isRight(all.front()) != before || isRight(all.back()) == before) return;  // several changes
   const auto from = std::ranges::find(all, before ? looked.right : looked.other),
              to = std::ranges::find(all, before ? looked.other : looked.right);
   const auto changed =

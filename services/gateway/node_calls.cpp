@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "common/wire/checks.h"
 #include "services/gateway/node.h"
 
 namespace perdure::gateway {
@@ -71,9 +72,7 @@ std::optional<MapQuery> queryOf(const Json& request) {
 
 std::string textOf(const Json& request, const char* name) {
   const auto found = request.find(name);
-  constexpr std::size_t kMost = 64;
-  return found != request.end() && found->is_string() ? found->get<std::string>().substr(0, kMost)
-                                                      : std::string();
+  return found != request.end() && found->is_string() ? found->get<std::string>() : std::string();
 }
 
 /// Returns the correction of a request, or nothing if it has no valid one.
@@ -95,10 +94,15 @@ std::optional<Correction> correctionOf(const Json& request) {
   correction.object = *object;
   correction.other = idOf(request, "other").value_or(0);
   correction.class_name = textOf(request, "class");
-  correction.nats = std::clamp(numberOf(request, "nats").value_or(0.0), 0.0, kMostCorrectionNats);
+  const auto nats = numberOf(request, "nats");
+  if (nats && !(*nats > 0.0 && *nats <= kMostCorrectionNats)) return std::nullopt;
+  correction.nats = nats.value_or(0.0);  // 0: the map's default
   if (correction.aboutTwo() && correction.other == 0) return std::nullopt;
   if (correction.kind == CorrectionKind::kClass && correction.class_name.empty()) {
     return std::nullopt;
+  }
+  for (const std::string* text : {&correction.author, &correction.class_name}) {
+    if (text->size() > kNameLength || !wire::isText(*text)) return std::nullopt;
   }
   return correction;
 }

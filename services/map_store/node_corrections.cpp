@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/wire/checks.h"
 #include "services/map_store/node.h"
 
 namespace perdure::map_store {
@@ -13,6 +14,13 @@ namespace {
 Correction* findCorrection(std::vector<Correction>& corrections, std::uint64_t id) {
   const auto at = std::ranges::find(corrections, id, &Correction::id);
   return at == corrections.end() ? nullptr : &*at;
+}
+
+/// Whether a standing correction is the statement of another one.
+bool saysTheSame(Correction standing, const Correction& other) {
+  standing.id = other.id;
+  standing.time = other.time;
+  return standing == other;
 }
 
 }  // namespace
@@ -67,13 +75,21 @@ std::string Node::completed(Correction& correction) {
     correction.withdrawn = true;
     return {};
   }
-  if (all.size() >= kMostCorrections) {
-    return fmt::format("the map has {} corrections, which is the limit", all.size());
+  if (correction.author.size() > kNameLength || !wire::isText(correction.author)) {
+    return "the author's name is too long, or not UTF-8 text";
   }
-  correction.id = all.empty() ? 1 : all.back().id + 1;
   if (correction.nats == 0.0) correction.nats = config_.correction_nats;
   if (!correction.aboutTwo()) correction.other = 0;
+  correction.id = all.empty() ? 1 : all.back().id + 1;
   correction.time = newest_->stamp.time;
+  // The same statement again: its answer was lost, or somebody insists.
+  for (const Correction& known : all) {
+    if (saysTheSame(known, correction)) correction = known;
+  }
+  const auto standing = std::ranges::count(all, false, &Correction::withdrawn);
+  if (std::cmp_greater_equal(standing, kMostCorrections)) {
+    return fmt::format("the map has {} corrections, which is the limit", standing);
+  }
   return faultOfNew(correction);
 }
 
@@ -124,6 +140,9 @@ void Node::addCorrections(MapNear& near) const {
   for (Correction each : identity.corrections()) {
     const bool is_used = !each.withdrawn && each.kind != CorrectionKind::kDifferent;
     if (!is_used || !here.contains(identity.objectOf(each.object))) continue;
+    const bool outweighed = each.kind == CorrectionKind::kSame &&
+                            identity.objectOf(each.object) != identity.objectOf(each.other);
+    if (outweighed) continue;
     each.object = identity.observedObjectOf(each.object);
     each.other = identity.observedObjectOf(each.other);
     near.corrections.push_back(std::move(each));

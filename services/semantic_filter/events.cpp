@@ -156,16 +156,16 @@ EventTracker::Changes EventTracker::update(const Objects& objects,
 
 ObjectStates::Changes ObjectStates::update(const Objects& objects) {
   Changes changes;
-  std::set<ObjectId> present;
+  std::set<ObjectId> present, corrected;
+  for (const auto& o : objects.as_estimated) corrected.insert(o.id);
   for (const auto& o : objects.objects) {
     present.insert(o.id);
     const auto [it, fresh] = sent_.try_emplace(o.id);
     Sent& sent = it->second;
-    if (!fresh && sent.as_of == o.as_of && sent.visibility == o.visibility &&
-        sent.confirmed == o.confirmed) {
-      continue;
-    }
-    sent = {o.as_of, o.visibility, o.confirmed};
+    Sent now{o.as_of, o.visibility, o.confirmed, {}, 0.0};
+    if (corrected.contains(o.id)) now.class_name = o.best().name, now.existence = o.existence;
+    if (!fresh && sent == now) continue;
+    sent = std::move(now);
     changes.written.push_back({objects.stamp, objects.instance, objects.world, o});
   }
   std::erase_if(sent_, [&](const auto& entry) {

@@ -53,7 +53,7 @@ class EventTracker {
 class ObjectStates {
  public:
   struct Changes {
-    /// new, updated by a frame, or changed in visibility or confirmation
+    /// new, updated by a frame, corrected by people, or changed in visibility or confirmation
     std::vector<ObjectState> written;
     std::vector<ObjectState> gone;  ///< only the key is valid
   };
@@ -64,6 +64,9 @@ class ObjectStates {
     TimePoint as_of;
     Visibility visibility = Visibility::kVisible;
     bool confirmed = false;
+    std::string class_name;  ///< of objects that people corrected
+    double existence = 0.0;  ///< of objects that people corrected
+    bool operator==(const Sent&) const = default;
   };
   std::map<ObjectId, Sent> sent_;
 };

@@ -162,6 +162,7 @@ bool isUneven(const std::vector<Turn>& turns, const replay::Recording& recording
   constexpr double kAgree = 0.15, kContradict = 0.4;
   constexpr std::size_t kFewest = 8;
   const CameraCalibration& camera = recording.calibration.cameras.front();
+  if (recording.frames.empty()) return false;
   const TimePoint middle = recording.frames[recording.frames.size() / 2].time;
   const Duration later = durationFromSeconds(camera.time_offset_s);
   const TurnIntegral gyro(recording.imu);

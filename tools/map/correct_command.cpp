@@ -23,15 +23,26 @@ struct CorrectCommand {
   ObjectId same_as = 0, different_from = 0;
 };
 
-/// Throws StartupError if another program has opened the map. A map_store would not notice the
-/// correction.
-void checkUnused(const std::string& path) {
+/// Returns the size of the file's tiles. Throws StartupError if another program has opened the map,
+/// because a map_store would not notice the correction, or if the file is damaged or follows a
+/// server.
+double checkUsable(const std::string& path) {
   (void)map_store::openStoreForReading(path);
   using map_store::Connection;
   const auto connection = Connection::open(path, Connection::Mode::kReadWriteCreate);
   if (!connection) map_store::cannotReadMap(path, connection.error());
+  if (const auto sound = map_store::wholeFileIsSound(*connection); !sound) {
+    map_store::cannotReadMap(path, sound.error());
+  }
+  if (connection->has("outbox").value_or(false)) {
+    throw StartupError(ExitCode::kUsage,
+                       "{} is sent to a server: start its map_store, and leave out --db", path);
+  }
+  const auto size = connection->first("SELECT value FROM meta WHERE key = 'tile_size_m'",
+                                      [](const map_store::Statement& row) { return row.real(0); });
   const auto alone = connection->execute("PRAGMA locking_mode=EXCLUSIVE; BEGIN IMMEDIATE; COMMIT");
-  if (alone) return;
+  if (alone)
+    return size ? size->value_or(map_store::Config().tile_size_m) : map_store::Config().tile_size_m;
   if (alone.error().code != "busy") map_store::cannotReadMap(path, alone.error());
   throw StartupError(ExitCode::kUnavailable,
                      "{} is in use by another program; leave out --db to send the correction to "
@@ -42,7 +53,9 @@ void checkUnused(const std::string& path) {
 /// Runs a map_store on the file for one request.
 MapReply askFile(const std::string& path, auto request) {
   map_store::Config config;
+  config.tile_size_m = checkUsable(path);
   config.store_path = path;
+  config.check_at_start = false;  // it would rename a damaged file
   MapReply answer;
   map_store::Node node(config, makeInstanceId(),
                        {.tile = [](const MapTile&) {},
@@ -56,7 +69,6 @@ MapReply askFile(const std::string& path, auto request) {
 
 MapReply ask(const CorrectCommand& command) {
   const std::string& path = command.place.db;
-  if (!path.empty()) checkUnused(path);
   if (command.list) {
     MapQuery query;
     query.limit = 1;
@@ -120,21 +132,29 @@ void addCorrectCommand(CLI::App& map) {
                                          "States that the map is wrong about an object; --withdraw "
                                          "takes it back");
   Correction& correction = given->correction;
-  command->add_option("ID", correction.object, "the object's id");
+  command->add_option("ID", correction.object, "the object's id")->check(CLI::PositiveNumber);
   CLI::Option_group* what = command->add_option_group("what is stated");
   what->require_option(1);
   what->add_flag("--not-there", given->not_there, "the object does not exist");
-  what->add_option("--class", correction.class_name, "its right class")->type_name("NAME");
-  what->add_option("--same-as", given->same_as, "it is the same as this object")->type_name("ID");
+  what->add_option("--class", correction.class_name, "its right class")
+      ->type_name("NAME")
+      ->check([](const std::string& name) {
+        return name.empty() ? "give the name of a class" : std::string();
+      });
+  what->add_option("--same-as", given->same_as, "it is the same as this object")
+      ->type_name("ID")
+      ->check(CLI::PositiveNumber);
   what->add_option("--different-from", given->different_from,
                    "this object, or a track merged into it, is another one")
-      ->type_name("ID");
-  what->add_option("--withdraw", correction.id, "takes the correction with this number back");
+      ->type_name("ID")
+      ->check(CLI::PositiveNumber);
+  what->add_option("--withdraw", correction.id, "takes the correction with this number back")
+      ->check(CLI::PositiveNumber);
   what->add_flag("--list", given->list, "shows the standing corrections");
   command
       ->add_option("--nats", correction.nats,
                    "log-likelihood ratio of the statement; without: map_store's corrections.nats")
-      ->check(CLI::Range(0.0, kMostCorrectionNats));
+      ->check(CLI::Range(0.01, kMostCorrectionNats));
   command->add_option("--author", correction.author, "who states it; without: the user's name");
   command->add_flag("--json", given->json, "as JSON");
   addPlace(*command, given->place);

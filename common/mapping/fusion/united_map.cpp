@@ -157,12 +157,15 @@ class Uniting {
     std::vector<Correction>& ours = map_.graph.corrections;
     const auto ofOurs = [&](ObjectId theirs) {
       const auto at = id_of_.find(theirs);
-      return at == id_of_.end() ? theirs : at->second;
+      return survivorOf(map_, at == id_of_.end() ? theirs : at->second);
     };
     for (Correction each : other_.graph.corrections) {
       each.object = ofOurs(each.object);
       each.other = ofOurs(each.other);
+      if (each.aboutTwo() && each.object == each.other) continue;
       const auto known = std::ranges::find_if(ours, [&](Correction one) {
+        one.object = survivorOf(map_, one.object);
+        one.other = survivorOf(map_, one.other);
         one.id = each.id;
         one.withdrawn = each.withdrawn;
         return one == each;

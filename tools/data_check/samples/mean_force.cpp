@@ -83,23 +83,39 @@ double angleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
+/// The mean direction of some stretches, and the largest angle of one of them to it.
+struct Direction {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  double spread = 0.0;
+};
+
+Direction directionOf(MeanForces::const_iterator first, MeanForces::const_iterator last) {
+  Direction direction;
+  for (auto one = first; one != last; ++one) direction.mean += one->fixed.normalized();
+  for (auto one = first; one != last; ++one) {
+    direction.spread = std::max(direction.spread, angleBetween(one->fixed, direction.mean));
+  }
+  return direction;
+}
+
 /// The stretch in which direction or size of the force changes once and for all.
 replay::DataFindings judgeForceChange(const MeanForces& forces) {
   constexpr double kTurned = 0.7, kOther_m_s2 = 0.6, kEqual = 0.35;
-  double most = 0.0, most_size = 0.0;
   for (std::size_t k = 2; k + 3 <= forces.size(); ++k) {  // the change is in stretch k
     const auto middle = forces.begin() + static_cast<std::ptrdiff_t>(k);
     const Sizes before = sizesOf(forces.begin(), middle), after = sizesOf(middle + 1, forces.end());
-    const double angle = angleBetween(forces[k - 1].fixed, forces[k + 1].fixed);
+    const Direction d0 = directionOf(forces.begin(), middle),
+                    d1 = directionOf(middle + 1, forces.end());
+    const double angle = angleBetween(d0.mean, d1.mean);
+    const bool turned = angle > kTurned && std::max(d0.spread, d1.spread) < kEqual * angle;
     const double size = std::abs(after.middle() - before.middle());
     const double spread = std::max(before.most - before.least, after.most - after.least);
-    most = std::max(most, angle), most_size = std::max(most_size, size);
     const bool other = size > kOther_m_s2 && spread < kEqual * size;
-    if (angle < kTurned && !other) continue;
+    if (!turned && !other) continue;
     const std::string what =
-        angle < kTurned ? fmt::format("from {:.2f} to {:.2f} m/s²", before.middle(), after.middle())
-                        : fmt::format("its direction by {:.0f}°, which the gyroscope does not show",
-                                      angle * 180.0 / M_PI);
+        !turned ? fmt::format("from {:.2f} to {:.2f} m/s²", before.middle(), after.middle())
+                : fmt::format("its direction by {:.0f}°, which the gyroscope does not show",
+                              angle * 180.0 / M_PI);
     return {{replay::DataFinding::Grade::kWarning, "accel_changes",
              fmt::format("the mean force changes {} between {} and {} ns: from there on, a sign, "
                          "the scale, the bias or the columns of the accelerometer are others, or "

@@ -39,8 +39,8 @@ std::size_t blockAt(const Samples& samples, std::size_t first, bool of_gyro, Eig
     ++end;
   }
   if (end == samples.size() || end - first > kMost) return 0;
-  // A single sample of the accelerometer may be a shock.
-  if (!of_gyro && end - first < 2) return 0;
+  // Few equal samples of the accelerometer may be a shock, at a lower rate or at the limit.
+  if (!of_gyro && end - first < 3) return 0;
   return std::abs(value(end) - before) <= kBack * jump ? end - first : 0;
 }
 
