@@ -245,6 +245,41 @@ TEST(MapState, AnyStepsLeaveWhatOneSaveWouldHaveWritten) {
   }
 }
 
+Correction different(std::uint64_t id, ObjectId object, ObjectId other, bool withdrawn = false) {
+  return {id, CorrectionKind::kDifferent, object, other, {}, 10.0, "me", {}, withdrawn};
+}
+
+TEST(MapState, ADeniedFactLeavesBothObjects) {
+  Pair pair;
+  pair.both([](MapState& state) { state.add(anchorAt(1, 0, kOlder, 0.0)); });
+  pair.see(5, 1, true, 1.0);
+  pair.see(9, 1, true, 2.0);
+  pair.both([](MapState& state) { state.put(different(1, 5, 9)); });
+  pair.save();
+  pair.both([](MapState& state) { state.unite({7, 5, 9}); });
+  pair.save();
+  EXPECT_EQ(keysOf(pair.stored().objects), (std::vector<ObjectId>{5, 9}));
+}
+
+TEST(MapState, ATrackThatADenialKeptAloneJoinsWhenTheOtherLeaves) {
+  Pair pair;
+  pair.both([](MapState& state) { state.add(anchorAt(1, 0, kOlder, 0.0)); });
+  for (const TrackId track : {5, 9, 20}) pair.see(track, 1, true, 1.0 * static_cast<double>(track));
+  pair.both([](MapState& state) {
+    state.put(different(1, 9, 20));
+    state.unite({7, 5, 9});
+    state.unite({8, 5, 20});
+  });
+  pair.save();
+  EXPECT_EQ(keysOf(pair.stored().objects), (std::vector<ObjectId>{5, 20}));
+  pair.both([](MapState& state) { state.put(different(2, 5, 9)); });
+  pair.save();
+  EXPECT_EQ(keysOf(pair.stored().objects), (std::vector<ObjectId>{5, 9}));
+  pair.both([](MapState& state) { state.put(different(2, 5, 9, true)); });
+  pair.save();
+  EXPECT_EQ(keysOf(pair.stored().objects), (std::vector<ObjectId>{5, 20}));
+}
+
 TEST(MapState, NumbersOfClassesGoOnAfterARestart) {
   MapState state({}, {});
   EXPECT_EQ(state.numberOf("car"), 0u);

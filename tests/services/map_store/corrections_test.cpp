@@ -254,6 +254,31 @@ TEST_F(CorrectedMap, ARepeatedRequestIsOneCorrection) {
   EXPECT_THAT(ask(MapQueryKind::kAll).corrections, SizeIs(1));
 }
 
+TEST_F(CorrectedMap, AStatementThatIsMadeAgainCountsOnce) {
+  ASSERT_TRUE(send(notThere(1)).ok);
+  const double existence = belief(1).existence;
+  ASSERT_TRUE(send(notThere(1)).ok) << reply_.error;
+  EXPECT_EQ(reply_.corrections.at(0).id, 1u);
+  EXPECT_EQ(belief(1).existence, existence);
+  Correction by_another = notThere(1);
+  by_another.author = "another";
+  ASSERT_TRUE(send(by_another).ok) << reply_.error;
+  EXPECT_LT(belief(1).existence, existence);
+}
+
+TEST_F(CorrectedMap, TheFilterDoesNotJoinWhatTheMapKeepsApart) {
+  ASSERT_TRUE(send(ofTwo(CorrectionKind::kSame, 3, 1)).ok) << reply_.error;
+  ASSERT_TRUE(send(ofTwo(CorrectionKind::kDifferent, 1, 3, 20.0)).ok) << reply_.error;
+  EXPECT_THAT(ids(), ElementsAre(1u, 2u, 3u));
+  EXPECT_THAT(near_.corrections, IsEmpty());
+}
+
+TEST_F(CorrectedMap, RefusesAnAuthorThatCannotBeSent) {
+  Correction correction = notThere(1);
+  correction.author = "\xff";
+  EXPECT_THAT(send(correction).error, HasSubstr("not UTF-8"));
+}
+
 TEST_F(CorrectedMap, StoresTheFiltersOwnBelief) {
   ObjectBelief own = carAt(1, {0, 0, 0}), shown = own;
   shown.existence = 0.01;

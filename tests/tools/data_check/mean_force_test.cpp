@@ -47,6 +47,15 @@ TEST(MeanForce, ASoundAccelerometerHasNoFinding) {
       << "biases of a cheap sensor";
 }
 
+TEST(MeanForce, PushesOfAFastVehicleAreNoFinding) {
+  // Full acceleration, then an emergency stop; then rest.
+  EXPECT_EQ(textAfter([](ImuSample& sample) {
+              const double t = toSeconds(sample.time.time_since_epoch()) - 1000.0;
+              sample.accel.x() += t > 4 && t < 8 ? 5.0 : t > 8 && t < 10.5 ? -8.0 : 0.0;
+            }),
+            "");
+}
+
 TEST(MeanForce, AWrongScaleIsNamedWithItsFactor) {
   EXPECT_THAT(textAfter([](ImuSample& sample) { sample.accel *= 1.06; }),
               testing::AllOf(HasSubstr("accel_factor"), HasSubstr("1.06")));

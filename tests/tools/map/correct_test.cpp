@@ -83,6 +83,17 @@ TEST_F(CorrectCommand, EachKindHasAnOption) {
   EXPECT_THAT(list, HasSubstr("3  same       2 and 1"));
 }
 
+TEST_F(CorrectCommand, AnEmptyOrZeroValueIsNotAnotherStatement) {
+  for (const std::vector<std::string>& words : {std::vector<std::string>{"1", "--class", ""},
+                                                {"1", "--same-as", "0"},
+                                                {"1", "--withdraw", "0"},
+                                                {"0", "--not-there"},
+                                                {"1", "--not-there", "--nats", "0"}}) {
+    EXPECT_THROW(run(words), CLI::ParseError) << words[1];
+  }
+  EXPECT_EQ(run({"--list"}), "");
+}
+
 TEST_F(CorrectCommand, RefusalsNameCauseAndFix) {
   EXPECT_THAT(refusal({"7", "--not-there"}, ExitCode::kFailure), HasSubstr("no object 7"));
   EXPECT_THAT(refusal({"1", "--same-as", "1"}, ExitCode::kFailure), HasSubstr("given twice"));
