@@ -321,14 +321,14 @@ Result<Start> MotionInitialiser::start(const ImuBuffer& imu,
   const TimePoint now = frames_.back().time;
   // A search takes the time of several frames, so the next one waits until the window has grown.
   if (failed_ && now < next_attempt_) return tl::unexpected(*failed_);
-  Result<Start> result = attempt(imu, cameras);
+  Result<Start> result = attempt(imu, cameras, 0);
+  // Tracks of fast motion are shorter than the window.
+  if (!result && result.error().code == "start_few_tracks") {
+    result = attempt(imu, cameras, frames_.size() / 2);
+  }
   failed_.reset();
   if (!result) {
     failed_ = result.error();
-    // Tracks of fast motion are shorter than the window.
-    if (failed_->code == "start_few_tracks") {
-      frames_.erase(frames_.begin(), frames_.begin() + static_cast<long>(frames_.size() / 2));
-    }
     const double window_s = toSeconds(now - frames_.front().time);
     next_attempt_ = now + durationFromSeconds(kGrowth * window_s);
   }
@@ -336,15 +336,17 @@ Result<Start> MotionInitialiser::start(const ImuBuffer& imu,
 }
 
 Result<Start> MotionInitialiser::attempt(const ImuBuffer& imu,
-                                         const std::vector<CameraModel>& cameras) const {
-  if (frames_.size() < 5 || imu.empty() ||
-      toSeconds(frames_.back().time - frames_.front().time) < kShortestWindow) {
+                                         const std::vector<CameraModel>& cameras,
+                                         std::size_t first) const {
+  const std::size_t frames = frames_.size() - first;
+  if (frames < 5 || imu.empty() ||
+      toSeconds(frames_.back().time - frames_[first].time) < kShortestWindow) {
     return fail("start_window_short");
   }
   Keyframes k;
-  const std::size_t count = std::min(kKeyframes, frames_.size());
+  const std::size_t count = std::min(kKeyframes, frames);
   for (std::size_t i = 0; i < count; ++i) {
-    const Seen& s = frames_[i * (frames_.size() - 1) / (count - 1)];
+    const Seen& s = frames_[first + i * (frames - 1) / (count - 1)];
     k.tracked.push_back(&s.tracked);
     k.times.push_back(s.time);
   }

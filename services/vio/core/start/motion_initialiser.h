@@ -28,7 +28,9 @@ class MotionInitialiser {
     TimePoint time;  ///< IMU clock
     TrackedFrame tracked;
   };
-  Result<Start> attempt(const ImuBuffer& imu, const std::vector<CameraModel>& cameras) const;
+  /// Uses the frames from number `first` on.
+  Result<Start> attempt(const ImuBuffer& imu, const std::vector<CameraModel>& cameras,
+                        std::size_t first) const;
 
   Options options_;
   std::deque<Seen> frames_;

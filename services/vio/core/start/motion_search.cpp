@@ -1,6 +1,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "common/base/algorithms/stable_sort.h"
@@ -12,8 +13,9 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kAsLikely = 9.0;  // largest difference in cost of minima that fit about as well
-constexpr double kSame = 0.01;     // largest relative difference in velocity of equal minima
+constexpr double kAsLikely = 9.0;     // largest difference in cost of minima that fit about as well
+constexpr std::ptrdiff_t kTried = 2;  // if these are unobservable, the other searches do not run
+constexpr double kSame = 0.01;        // largest relative difference in velocity of equal minima
 // The residuals do not contain the part of a view's error that is constant along its track.
 constexpr double kNoiseMargin = 1.2;
 constexpr double kLeastNoise = 0.25;  // least noise, as a share of vision.sigma_px
@@ -43,6 +45,18 @@ Result<Minima> refineAll(std::vector<MotionWindow> beginnings, const ImuBuffer& 
   if (minima.empty()) return failed;
   stableSortBy(minima, [](const RefinedWindow& m) { return m.cost; });
   return minima;
+}
+
+double noiseOf(const RefinedWindow& minimum) {
+  return std::clamp(kNoiseMargin * minimum.image_noise, kLeastNoise, 1.0);
+}
+
+/// Returns true if the velocity stays uncertain with the views' own noise.
+bool isUnobservable(const RefinedWindow& minimum) {
+  double fastest = 0.0;
+  for (const WindowPose& pose : minimum.window.poses) fastest = std::max(fastest, pose.v_B0.norm());
+  const double sigma = std::sqrt(minimum.covariance.block<3, 3>(3, 3).trace());
+  return !(noiseOf(minimum) * sigma <= kVelocityShare * fastest);
 }
 
 /// Removes all but the minimum of lowest cost from each group of equal minima.
@@ -90,6 +104,13 @@ void placePoints(MotionWindow& window) {
 Result<RefinedWindow> searchMinimum(std::vector<MotionWindow> beginnings, const ImuBuffer& imu,
                                     const Options& options) {
   MotionWindow resting = beginnings.front();
+  const auto few = beginnings.begin() + std::min<std::ptrdiff_t>(kTried, std::ssize(beginnings));
+  const bool hopeless = std::all_of(beginnings.begin(), few, [&](MotionWindow& window) {
+    const auto minimum = refine(window, imu, options);
+    if (minimum) window = minimum->window;
+    return minimum && isUnobservable(*minimum);
+  });
+  if (hopeless) return fail("start_unobservable");
   auto minima = refineAll(std::move(beginnings), imu, options);
   if (!minima) return tl::unexpected(minima.error());
   if (turnMovesCameras(minima->front().window)) {
@@ -100,8 +121,7 @@ Result<RefinedWindow> searchMinimum(std::vector<MotionWindow> beginnings, const 
   }
   keepApart(*minima);
   Options as_seen = options;
-  as_seen.vision.sigma_px *=
-      std::clamp(kNoiseMargin * minima->front().image_noise, kLeastNoise, 1.0);
+  as_seen.vision.sigma_px *= noiseOf(minima->front());
   std::vector<MotionWindow> found;
   for (RefinedWindow& minimum : *minima) found.push_back(std::move(minimum.window));
   minima = refineAll(std::move(found), imu, as_seen);
