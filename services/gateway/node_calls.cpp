@@ -4,7 +4,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "common/wire/checks.h"
 #include "services/gateway/node.h"
 
 namespace perdure::gateway {
@@ -101,8 +100,9 @@ std::optional<Correction> correctionOf(const Json& request) {
   if (correction.kind == CorrectionKind::kClass && correction.class_name.empty()) {
     return std::nullopt;
   }
+  constexpr std::size_t kMostText = 256;  // bytes on the bus
   for (const std::string* text : {&correction.author, &correction.class_name}) {
-    if (text->size() > kNameLength || !wire::isText(*text)) return std::nullopt;
+    if (text->size() > kMostText) return std::nullopt;
   }
   return correction;
 }

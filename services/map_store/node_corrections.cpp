@@ -75,7 +75,7 @@ std::string Node::completed(Correction& correction) {
     correction.withdrawn = true;
     return {};
   }
-  if (correction.author.size() > kNameLength || !wire::isText(correction.author)) {
+  if (correction.author.size() > wire::kNameLength || !wire::isText(correction.author)) {
     return "the author's name is too long, or not UTF-8 text";
   }
   if (correction.nats == 0.0) correction.nats = config_.correction_nats;

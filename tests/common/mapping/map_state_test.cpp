@@ -258,7 +258,7 @@ TEST(MapState, ADeniedFactLeavesBothObjects) {
   pair.save();
   pair.both([](MapState& state) { state.unite({7, 5, 9}); });
   pair.save();
-  EXPECT_EQ(keysOf(pair.stored().objects), (std::vector<ObjectId>{5, 9}));
+  EXPECT_EQ(keysOf(pair.stored().records), (std::vector<ObjectId>{5, 9}));
 }
 
 TEST(MapState, ATrackThatADenialKeptAloneJoinsWhenTheOtherLeaves) {
@@ -271,13 +271,13 @@ TEST(MapState, ATrackThatADenialKeptAloneJoinsWhenTheOtherLeaves) {
     state.unite({8, 5, 20});
   });
   pair.save();
-  EXPECT_EQ(keysOf(pair.stored().objects), (std::vector<ObjectId>{5, 20}));
+  EXPECT_EQ(keysOf(pair.stored().records), (std::vector<ObjectId>{5, 20}));
   pair.both([](MapState& state) { state.put(different(2, 5, 9)); });
   pair.save();
-  EXPECT_EQ(keysOf(pair.stored().objects), (std::vector<ObjectId>{5, 9}));
+  EXPECT_EQ(keysOf(pair.stored().records), (std::vector<ObjectId>{5, 9}));
   pair.both([](MapState& state) { state.put(different(2, 5, 9, true)); });
   pair.save();
-  EXPECT_EQ(keysOf(pair.stored().objects), (std::vector<ObjectId>{5, 20}));
+  EXPECT_EQ(keysOf(pair.stored().records), (std::vector<ObjectId>{5, 20}));
 }
 
 TEST(MapState, NumbersOfClassesGoOnAfterARestart) {
