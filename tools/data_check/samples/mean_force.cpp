@@ -100,14 +100,16 @@ Direction directionOf(MeanForces::const_iterator first, MeanForces::const_iterat
 
 /// The stretch in which direction or size of the force changes once and for all.
 replay::DataFindings judgeForceChange(const MeanForces& forces) {
-  constexpr double kTurned = 0.7, kOther_m_s2 = 0.6, kEqual = 0.35;
+  constexpr double kTurned = 0.9, kOther_m_s2 = 0.6, kEqual = 0.35;
   for (std::size_t k = 2; k + 3 <= forces.size(); ++k) {  // the change is in stretch k
     const auto middle = forces.begin() + static_cast<std::ptrdiff_t>(k);
     const Sizes before = sizesOf(forces.begin(), middle), after = sizesOf(middle + 1, forces.end());
     const Direction d0 = directionOf(forces.begin(), middle),
                     d1 = directionOf(middle + 1, forces.end());
     const double angle = angleBetween(d0.mean, d1.mean);
-    const bool turned = angle > kTurned && std::max(d0.spread, d1.spread) < kEqual * angle;
+    const bool turned =
+        std::min(angle, angleBetween(forces[k - 1].fixed, forces[k + 1].fixed)) > kTurned &&
+        std::min(d0.spread, d1.spread) < kEqual * angle;
     const double size = std::abs(after.middle() - before.middle());
     const double spread = std::max(before.most - before.least, after.most - after.least);
     const bool other = size > kOther_m_s2 && spread < kEqual * size;
