@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "common/wire/checks.h"
 #include "services/map_store/node.h"
 
 namespace perdure::map_store {
@@ -74,9 +73,6 @@ std::string Node::completed(Correction& correction) {
     correction = *known;
     correction.withdrawn = true;
     return {};
-  }
-  if (correction.author.size() > wire::kNameLength || !wire::isText(correction.author)) {
-    return "the author's name is too long, or not UTF-8 text";
   }
   if (correction.nats == 0.0) correction.nats = config_.correction_nats;
   if (!correction.aboutTwo()) correction.other = 0;

@@ -10,6 +10,7 @@
 
 #include "common/base/errors.h"
 #include "common/base/ids.h"
+#include "common/wire/checks.h"
 #include "services/map_store/node.h"
 #include "tools/map/map_place.h"
 
@@ -155,7 +156,11 @@ void addCorrectCommand(CLI::App& map) {
       ->add_option("--nats", correction.nats,
                    "log-likelihood ratio of the statement; without: map_store's corrections.nats")
       ->check(CLI::Range(0.01, kMostCorrectionNats));
-  command->add_option("--author", correction.author, "who states it; without: the user's name");
+  command->add_option("--author", correction.author, "who states it; without: the user's name")
+      ->check([](const std::string& name) {
+        const bool sent = name.size() <= wire::kNameLength && wire::isText(name);
+        return sent ? std::string() : "the name is longer than 256 bytes, or not UTF-8 text";
+      });
   command->add_flag("--json", given->json, "as JSON");
   addPlace(*command, given->place);
   command->callback([given] { run(*given); });

@@ -273,12 +273,6 @@ TEST_F(CorrectedMap, TheFilterDoesNotJoinWhatTheMapKeepsApart) {
   EXPECT_THAT(near_.corrections, IsEmpty());
 }
 
-TEST_F(CorrectedMap, RefusesAnAuthorThatCannotBeSent) {
-  Correction correction = notThere(1);
-  correction.author = "\xff";
-  EXPECT_THAT(send(correction).error, HasSubstr("not UTF-8"));
-}
-
 TEST_F(CorrectedMap, StoresTheFiltersOwnBelief) {
   ObjectBelief own = carAt(1, {0, 0, 0}), shown = own;
   shown.existence = 0.01;

@@ -88,7 +88,8 @@ TEST_F(CorrectCommand, AnEmptyOrZeroValueIsNotAnotherStatement) {
                                                 {"1", "--same-as", "0"},
                                                 {"1", "--withdraw", "0"},
                                                 {"0", "--not-there"},
-                                                {"1", "--not-there", "--nats", "0"}}) {
+                                                {"1", "--not-there", "--nats", "0"},
+                                                {"1", "--not-there", "--author", "\xff"}}) {
     EXPECT_THROW(run(words), CLI::ParseError) << words[1];
   }
   EXPECT_EQ(run({"--list"}), "");

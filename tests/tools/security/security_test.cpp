@@ -178,6 +178,10 @@ TEST(Permissions, GiveEachTopicOneServiceThatWritesItAndEventsTwo) {
   for (const bus::TopicInfo& info : bus::topicTable()) {
     const auto writers = std::count_if(std::begin(kServices), std::end(kServices),
                                        [&](Role role) { return info.writers.has(role); });
+    if (info.name == "map/correct") {
+      EXPECT_EQ(writers, 0) << "people write it";
+      continue;
+    }
     // The filter and the map's graph write events.
     EXPECT_EQ(writers, info.name == "health" ? 5 : info.name == "events" ? 2 : 1) << info.name;
     EXPECT_TRUE(info.readers.has(Role::kRecord) && info.readers.has(Role::kOperator));

@@ -217,7 +217,7 @@ class Map:
         command += ["--not-there"] if fields.get("kind") == "not_there" else []
         for name in sorted(words.keys() & fields.keys()):
             option = words[name] if name != "other" else words[name][fields["kind"]]
-            command += [option, str(fields[name])]
+            command += [f"{option}={fields[name]}"] if name != "nats" or fields[name] else []
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode != 0:
             wrong = done.returncode in (1, 64)  # the statement, not the file
