@@ -143,11 +143,13 @@ Recording readRecording(const DatasetOptions& options) {
   if (!std::filesystem::is_directory(path)) {
     std::error_code error;
     if (std::filesystem::exists(path, error) && hasMessages(path)) return readMessages(options);
+    if (looksLikePhone(path)) return readPhone(options);
     if (std::filesystem::is_regular_file(path, error)) refuseFile(path);
     throwMissing(
         path, "the dataset folder",
         "--data takes a folder in EuRoC, KITTI raw, KITTI tracking or 7-Scenes layout, the "
-        "folder of a phone's logger, or a recording (.mcap; of ROS also .db3 and .bag)");
+        "folder of a phone's logger, a film of a GoPro, or a recording (.mcap; of ROS also .db3 "
+        "and .bag)");
   }
   const auto folder = readerOf(path);
   const bool messages = hasMessages(path);
@@ -166,8 +168,8 @@ Recording readRecording(const DatasetOptions& options) {
                          "with calib (KITTI tracking), with color and pose or "
                          "frame-000000.color.png and .pose.txt (7-Scenes), of a phone's logger "
                          "(with gyro_accel.csv, data.jsonl, NAME_gyro.csv and NAME_accel.csv, "
-                         "Gyroscope.csv, Gyro.txt and Frames.txt, or JSON records of sensors), or "
-                         "with recordings (.mcap, .db3, .bag)");
+                         "Gyroscope.csv, Gyro.txt and Frames.txt, or JSON records of sensors), "
+                         "with a film of a GoPro, or with recordings (.mcap, .db3, .bag)");
 }
 
 void numberFrames(Recording& recording) {

@@ -23,7 +23,7 @@ namespace {
 void addOptions(CLI::App& app, PipelineOptions& options) {
   app.add_option("--data", options.data,
                  "Dataset folder: EuRoC (simulated too), KITTI raw or tracking, 7-Scenes, or that "
-                 "of a phone's logger; or a recording: a .mcap file (of ROS too), .db3, .bag, or a "
+                 "of a phone's logger; a film of a GoPro; or a recording: .mcap (of ROS too), .db3, .bag, or a "
                  "folder of them")
       ->required();
   app.add_option(

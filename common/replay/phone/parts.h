@@ -59,6 +59,9 @@ extern const Format kJsonRecords;     ///< *.jsonl with sensor type, nanoseconds
 extern const Format kFilmWithTables;  ///< OpenCamera Sensors: NAME.mp4, NAME_gyro.csv …
 extern const Format kSensorLogger;    ///< Gyroscope.csv, TotalAcceleration.csv, Camera/
 extern const Format kIosLogger;       ///< Frames.m4v, Frames.txt, Gyro.txt, Accel.txt
+extern const Format kGoPro;           ///< a film with telemetry; the path may be the film itself
+
+bool isFilmName(const std::filesystem::path& file);
 
 /// Returns FOLDER/STEM.mp4, .mov, .m4v, .mkv or .avi, whichever exists; "" if none does.
 std::filesystem::path filmNamed(const std::filesystem::path& folder, const std::string& stem);

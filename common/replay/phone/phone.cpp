@@ -41,7 +41,7 @@ namespace {
 /// In this order, because a MARS folder also has the files of kFilmWithTables.
 const Format* formatOf(const std::filesystem::path& folder) {
   for (const Format* format : {&kMarsLogger, &kSpectacularAi, &kSensorLogger, &kIosLogger,
-                               &kFilmWithTables, &kJsonRecords}) {
+                               &kFilmWithTables, &kJsonRecords, &kGoPro}) {
     if (format->looks(folder)) return format;
   }
   return nullptr;

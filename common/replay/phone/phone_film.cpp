@@ -24,11 +24,6 @@ using vision::Film;
 
 constexpr std::array kFilmEndings{".mp4", ".mov", ".m4v", ".mkv", ".avi"};
 
-bool isFilmName(const fs::path& file) {
-  const std::string ending = toLower(file.extension().string());
-  return std::find(kFilmEndings.begin(), kFilmEndings.end(), ending) != kFilmEndings.end();
-}
-
 std::shared_ptr<Film> openFilm(const fs::path& file) {
   if (!fs::exists(file)) throwMissing(file, "the film", "copy it beside its list of stamps");
   refuseUnreadable(file);
@@ -175,6 +170,11 @@ void noteFocal(const PhoneCamera& camera, Recording& recording) {
 }
 
 }  // namespace
+
+bool isFilmName(const fs::path& file) {
+  const std::string ending = toLower(file.extension().string());
+  return std::find(kFilmEndings.begin(), kFilmEndings.end(), ending) != kFilmEndings.end();
+}
 
 fs::path filmNamed(const fs::path& folder, const std::string& stem) {
   const auto found = pathsIn(folder, [&](const fs::path& file) {
