@@ -211,9 +211,13 @@ void Node::drain(bool all) {
   while (cameras_ && !waiting_.empty() && (all || ready())) process(waiting_.take());
 }
 
+/// IMU time of the state, or of the last frame before a start.
+TimePoint Node::timeBefore(TimePoint now) const {
+  return started() ? cameras_->estimator.state().time : last_imu_time_.value_or(now);
+}
+
 void Node::noteGaps(TimePoint now) {
-  const TimePoint from =
-      started() ? cameras_->estimator.state().time : last_imu_time_.value_or(now);
+  const TimePoint from = timeBefore(now);
   if (from >= now || imu_.empty()) return;
   const double gap = toSeconds(imu_.longestGap(from, now));
   if (gap <= config_.core.imu.gap_from_s) return;
@@ -231,23 +235,15 @@ TrackedFrame Node::trackImages(const cv::Mat& first, const cv::Mat& second, Time
   if (cameras_->estimator.options().calibration.estimated().lens) {
     cameras_->tracker.setCameras(cameras_->estimator.cameras(cameras_->models));
   }
+  // With the rotation, the tracker can follow a minority of points at rest behind traffic.
   std::optional<Eigen::Matrix3d> R;
-  const double gap_from = config_.core.imu.gap_from_s;
-  if (started() && !imu_.empty() && imu_.last() > cameras_->estimator.state().time &&
-      toSeconds(imu_.longestGap(cameras_->estimator.state().time, now)) <= gap_from) {
-    R = cameras_->estimator.predictRotation(imu_, now);
+  const TimePoint from = timeBefore(now);
+  if (from < now && !imu_.empty() && imu_.last() > from &&
+      toSeconds(imu_.longestGap(from, now)) <= config_.core.imu.gap_from_s) {
+    R = cameras_->estimator.predictRotation(imu_, from, now);
   }
   const Eigen::Vector3d turn = cameras_->estimator.turnOfReadout(imu_, now);
-  if (!started()) {
-    // If the rotation is known, the tracker can follow a minority of points at rest behind traffic.
-    const auto motion = cameras_->tracker.motionSince(1, 0.8);
-    constexpr std::chrono::milliseconds kEven{500};
-    if (motion && *motion > config_.core.rest.disparity_px &&
-        imuIsEven(imu_, now, kEven, cameras_->estimator.options().imu)) {
-      R = Eigen::Matrix3d::Identity();
-    }
-    return cameras_->tracker.track(first, second, R, {}, turn);
-  }
+  if (!started()) return cameras_->tracker.track(first, second, R, {}, turn);
   const State& state = cameras_->estimator.state();
   RigidTransform T_WB = state.nav.T_WB();
   T_WB.p += toSeconds(now - state.time) * state.nav.v_WB;

@@ -74,6 +74,7 @@ class Node {
   Result<Start> startWithoutSpeed(TimePoint now);
   std::size_t framesIn(double seconds) const;
   bool resume(TimePoint now);
+  TimePoint timeBefore(TimePoint now) const;
   void noteGaps(TimePoint now);
   void judgeImages(const FrameEstimate& estimate);
   void lose(const Reason& reason);

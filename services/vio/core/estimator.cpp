@@ -32,12 +32,12 @@ Estimator::Estimator(const Options& options, const std::vector<RigidTransform>& 
   readout_s_.resize(T_BC.size(), 0.0);
 }
 
-Eigen::Matrix3d Estimator::predictRotation(const ImuBuffer& imu, TimePoint to) {
-  if (!state_ || to <= state_->time || imu.empty()) return Eigen::Matrix3d::Identity();
-  imu.between(state_->time, to, readings_);
-  return integrateRotation(readings_, state_->nav.gyro_bias, state_->gyro_scale)
-      .toRotationMatrix()
-      .transpose();
+Eigen::Matrix3d Estimator::predictRotation(const ImuBuffer& imu, TimePoint from, TimePoint to) {
+  if (to <= from || imu.empty()) return Eigen::Matrix3d::Identity();
+  imu.between(from, to, readings_);
+  const Eigen::Vector3d bias = state_ ? state_->nav.gyro_bias : Eigen::Vector3d::Zero();
+  const Eigen::Vector3d scale = state_ ? state_->gyro_scale : Eigen::Vector3d::Ones();
+  return integrateRotation(readings_, bias, scale).toRotationMatrix().transpose();
 }
 
 Eigen::Vector3d Estimator::turnOfReadout(const ImuBuffer& imu, TimePoint time) {

@@ -83,9 +83,10 @@ class Estimator {
   /// stopped.
   Result<FrameEstimate> process(const FrameInput& input, const ImuBuffer& imu);
 
-  /// Returns the gyroscope's rotation R_B1_B0 of the body from the state's time to the IMU time
-  /// `to`. Returns the identity without a state or samples, or if `to` is not later.
-  Eigen::Matrix3d predictRotation(const ImuBuffer& imu, TimePoint to);
+  /// Returns the gyroscope's rotation R_B1_B0 of the body between two IMU times. Before a start,
+  /// the gyroscope's bias is assumed to be zero. Returns the identity without samples, or if `to`
+  /// is not later.
+  Eigen::Matrix3d predictRotation(const ImuBuffer& imu, TimePoint from, TimePoint to);
 
   /// Returns the rotation vector, in B, of the body while the first camera reads out an image of
   /// the IMU time `time`. Before a start, the gyroscope's bias is assumed to be zero. Returns zero

@@ -111,10 +111,11 @@ TEST_F(Propagation, AllocatesNothing) {
 TEST_F(Prediction, OfTheRotationAllocatesNothing) {
   RunningFilter run({}, 5.0);
   while (run.frame < 60) run.step();
+  const TimePoint from = run.estimator.state().time;
   const TimePoint to = run.drive.time(run.now() + kFramePeriod);
-  run.estimator.predictRotation(run.imu, to);
+  run.estimator.predictRotation(run.imu, from, to);
   const tests::Allocations before = allocations();
-  const Eigen::Matrix3d R = run.estimator.predictRotation(run.imu, to);
+  const Eigen::Matrix3d R = run.estimator.predictRotation(run.imu, from, to);
   EXPECT_EQ(allocationsSince(before).own, 0u) << R;
 }
 

@@ -19,8 +19,9 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr std::size_t kKeyframes = 8, kFewestTracks = 15, kFewestViews = 3, kMostPoints = 120;
-constexpr double kShortestWindow = 0.2;  // s
+constexpr std::size_t kKeyframes = 8, kFewestTracks = 15, kFewestViews = 3, kMostPoints = 120,
+                      kFewestFrames = 5;
+constexpr double kShortestWindow = 0.4;  // s; shorter ones have wrong minima that fit as well
 constexpr double kGrowth = 0.1;          // share of the window's duration between searches
 constexpr double kMostNoise = 1.25;      // largest RefinedWindow::noise_ratio
 constexpr double kSpeeds[] = {0.3, 1.0, 3.0, 10.0};  // m/s, at the beginning of the searches
@@ -323,8 +324,11 @@ Result<Start> MotionInitialiser::start(const ImuBuffer& imu,
   if (failed_ && now < next_attempt_) return tl::unexpected(*failed_);
   Result<Start> result = attempt(imu, cameras, 0);
   // Tracks of fast motion are shorter than the window.
-  if (!result && result.error().code == "start_few_tracks") {
-    result = attempt(imu, cameras, frames_.size() / 2);
+  for (std::size_t first = frames_.size() / 2; first + kFewestFrames <= frames_.size();
+       first = (first + frames_.size()) / 2) {
+    if (result || result.error().code != "start_few_tracks") break;
+    if (toSeconds(now - frames_[first].time) < kShortestWindow) break;
+    result = attempt(imu, cameras, first);
   }
   failed_.reset();
   if (!result) {
@@ -339,7 +343,7 @@ Result<Start> MotionInitialiser::attempt(const ImuBuffer& imu,
                                          const std::vector<CameraModel>& cameras,
                                          std::size_t first) const {
   const std::size_t frames = frames_.size() - first;
-  if (frames < 5 || imu.empty() ||
+  if (frames < kFewestFrames || imu.empty() ||
       toSeconds(frames_.back().time - frames_[first].time) < kShortestWindow) {
     return fail("start_window_short");
   }

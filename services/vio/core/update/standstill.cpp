@@ -29,6 +29,23 @@ bool agree(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double sigma, dou
 
 double squared(double x) { return x * x; }
 
+/// The means, with deviations from the differences of successive samples: of a motion that is slow
+/// against the samples, such as steps, nothing counts as noise.
+RestSample evenSample(const std::vector<ImuReading>& readings, const ImuNoise& noise) {
+  RestSample s = restSample(readings, noise);
+  double rate2 = 0.0, force2 = 0.0;
+  for (std::size_t i = 1; i < readings.size(); ++i) {
+    rate2 += (readings[i].gyro - readings[i - 1].gyro).squaredNorm() / 6.0;
+    force2 += (readings[i].accel - readings[i - 1].accel).squaredNorm() / 6.0;
+  }
+  const double n = static_cast<double>(readings.size());
+  const double dt = toSeconds(readings.back().time - readings.front().time);
+  const double credit = std::max(1.0, n / 4.0) * (n - 1.0);  // as restSample()
+  s.rate_sigma = std::sqrt(squared(noise.gyro) / dt + rate2 / credit);
+  s.force_sigma = std::sqrt(squared(noise.accel) / dt + force2 / credit);
+  return s;
+}
+
 }  // namespace
 
 RestExpectation restExpectation(const State& state, double gravity) {
@@ -58,9 +75,11 @@ bool imuRests(const ImuBuffer& imu, TimePoint now, Duration window, const RestEx
 bool imuIsEven(const ImuBuffer& imu, TimePoint now, Duration window, const ImuNoise& noise) {
   if (!reachesBack(imu, now, window)) return false;
   const Duration half = window / 2;
-  const RestSample before = restSample(imu.between(now - window, now - half), noise);
-  return imuRests(imu, now, half,
-                  {before.rate, before.force, before.rate_sigma, before.force_sigma}, half, noise);
+  const RestSample a = evenSample(imu.between(now - window, now - half), noise);
+  const RestSample b = evenSample(imu.between(now - half, now), noise);
+  const double T = toSeconds(half);
+  return agree(a.rate, b.rate, std::hypot(a.rate_sigma, b.rate_sigma), kTurnGain / T) &&
+         agree(a.force, b.force, std::hypot(a.force_sigma, b.force_sigma), kSpeedGain / T);
 }
 
 void Standstill::confirm(TimePoint now, const RestExpectation& expected) {
