@@ -211,13 +211,7 @@ replay::DataFindings checkDrive(const replay::Recording& recording, const replay
   add("repeated images", findings, [&] { return checkFrozenImages(recording); });
   add("what belongs together", findings, [&] { return checkPairs(recording); });
   add("the two cameras", findings, [&] { return checkStereo(recording); });
-  // With these, the rotations of images and gyroscope would differ too.
-  const bool known = std::ranges::any_of(findings, [](const auto& one) {
-    return one.code == "stamps_of_arrival" || one.code == "clock_set_alone" ||
-           one.code == "imu_axis_stuck" || one.code == "imu_spike" || one.code == "imu_block" ||
-           one.code == "imu_saturated";
-  });
-  if (!use.imu || known) return findings;
+  if (!use.imu || std::ranges::any_of(findings, isCause)) return findings;
   const std::size_t before = findings.size();
   add("turning", findings, [&] { return checkTurns(recording); });
   if (findings.size() == before)

@@ -114,13 +114,13 @@ void Pipeline::checkData() {
   if (options_.odometry == "vio" || options_.landmarks) {
     const auto unknown = vio::unknownCamera(configs_.vio, dataset_->calibration());
     if (!unknown.empty()) {
-      findings_.push_back({replay::DataFinding::Grade::kWarning, "camera_unknown",
+      findings_.push_back({replay::DataFinding::Grade::kNote, "camera_unknown",
                            unknown + "; set vio.input.cameras to these"});
     }
   }
   if (isSimulated(options_.data)) {
     if (const auto lack = lackOfTruth(options_.data, *dataset_); !lack.empty())
-      findings_.push_back({replay::DataFinding::Grade::kWarning, "truth_incomplete",
+      findings_.push_back({replay::DataFinding::Grade::kNote, "truth_incomplete",
                            lack + "; the report has no scores"});
   }
   replay::refuseFatal(findings_, options_.data);
