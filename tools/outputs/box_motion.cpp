@@ -245,6 +245,35 @@ std::optional<Change> changeInPart(const Givens& given, const std::vector<Change
   return change;
 }
 
+/// A doubt if most tracks contradict the poses of their frames, and agree no better with these than
+/// with the poses of frames half a drive away.
+std::optional<Doubt> doubtOfDrive(const Givens& all, const Frames& frames,
+                                  const CameraModel& camera) {
+  constexpr std::size_t kLeast = 20;
+  constexpr double kMoving = 0.3, kNoBetter = 0.6;
+  if (all.size() < kLeast) return std::nullopt;
+  const auto half = static_cast<std::int64_t>(frames.rbegin()->first / 2);
+  std::vector<double> residuals;
+  double better = 0.0;
+  for (const Given& given : all) {
+    const bool early = static_cast<std::int64_t>(given.track->front().frame) < half;
+    const auto off = deviationsOf(*given.track, {.shift = early ? half : -half}, frames, camera);
+    if (!off) continue;
+    residuals.push_back(given.residual);
+    const double other = residualOf(*off);
+    better += given.residual < other ? 1.0 : given.residual > other ? 0.0 : 0.5;
+  }
+  const auto tracks = static_cast<double>(residuals.size());
+  if (residuals.size() < kLeast || better > kNoBetter * tracks ||
+      medianOf(std::move(residuals)) < kMoving)
+    return std::nullopt;
+  return Doubt{"boxes contradict the poses",
+               fmt::format("{:.0f} tracks of boxes do not move as the poses predict, and move no "
+                           "better with their own frames' poses than with others: the boxes are "
+                           "of another drive or camera, or the poses are",
+                           tracks)};
+}
+
 }  // namespace
 
 std::optional<Doubt> doubtOfBoxes(const Frames& frames, const CameraCalibration& calibration) {
@@ -257,7 +286,7 @@ std::optional<Doubt> doubtOfBoxes(const Frames& frames, const CameraCalibration&
   std::ranges::move(changesOfNumbers(frames), std::back_inserter(changes));
   auto change = changeIn(given, changes, frames, camera);
   if (!change) change = changeInPart(given, changes, frames, camera);
-  return change ? std::optional(change->doubt) : std::nullopt;
+  return change ? std::optional(change->doubt) : doubtOfDrive(given, frames, camera);
 }
 
 }  // namespace perdure::tools

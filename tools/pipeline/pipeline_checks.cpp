@@ -200,6 +200,21 @@ void Pipeline::checkClasses(const semantic_filter::ClassPriors& priors) {
                    options_.detections, names, configs_.semantic_filter.class_priors)});
 }
 
+std::vector<EstimatedHeight> Pipeline::estimatedHeights() const {
+  constexpr int kHeight = 6;
+  const auto priors = semantic_filter::loadPriors(configs_.semantic_filter);
+  std::vector<EstimatedHeight> heights;
+  for (const auto& object : outputs_->history().lastBeliefs()) {
+    const ClassBelief& best = object.best();
+    const auto& prior = priors.of(best.name);
+    if (!object.confirmed || prior.name.empty()) continue;
+    heights.push_back({best.mean[kHeight] - prior.log_size.z(),
+                       std::sqrt(best.covariance(kHeight, kHeight)),
+                       std::sqrt(prior.log_size_covariance(2, 2))});
+  }
+  return heights;
+}
+
 void Pipeline::refuseUnwritten() const {
   for (const auto& [service, reasons] : reasons()) {
     for (const auto& [code, n] : reasons.all()) {
