@@ -144,10 +144,11 @@ replay::DataFindings judgeHalves(const replay::Recording& recording) {
   auto &first = halves[0].frames, &second = halves[1].frames;
   first.erase(first.begin() + middle, first.end());
   second.erase(second.begin(), second.begin() + middle);
-  const std::array<TurnCheck, 2> checks{TurnCheck(halves[0], false), TurnCheck(halves[1], false)};
+  std::array<TurnCheck, 2> checks{TurnCheck(halves[0], false), TurnCheck(halves[1], false)};
   for (const std::size_t bad : {1, 0}) {
     if (!checks[1 - bad].agrees(halves[1 - bad]) || checks[bad].findings.empty()) continue;
-    auto findings = checks[bad].findings;
+    auto findings = checkBackwards(halves[bad], checks[bad].known);
+    if (findings.empty()) findings = checks[bad].findings;
     findings.front().text =
         fmt::format("something changes in mid-drive: only {} {} ns, {}; cut the drive there",
                     bad == 1 ? "from about" : "until about", toNanoseconds(second.front().time),
