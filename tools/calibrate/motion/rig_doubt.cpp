@@ -35,8 +35,8 @@ replay::DataFindings judge(const CameraCalibration& given, const JointEstimate& 
     return std::abs(change) > std::max(least, kSurely * sigma);
   };
   const auto add = [&](const char* code, const std::string& text) {
-    findings.push_back({Grade::kWarning, code,
-                        text + "; or let perdure calibrate from-motion find the whole rig"});
+    findings.push_back(
+        {Grade::kCause, code, text + "; or let perdure calibrate from-motion find the whole rig"});
   };
   if (differs(found.fx / given.fx - 1.0, kLeastShare, s[kFocal])) {
     add("focal_length",
@@ -81,6 +81,7 @@ JointVector leastChange() {
 /// Judges what differs between the estimates of the two halves of a drive.
 replay::DataFindings judgeChange(const JointEstimate& a, const JointEstimate& b, TimePoint middle) {
   constexpr double kClearly = 6.0;  // standard deviations; those of few windows are uncertain
+  constexpr double kClock_s = 0.01;
   const JointVector change = between(a.state, b.state), least = leastChange(),
                     sigma = (a.sigma.cwiseAbs2() + b.sigma.cwiseAbs2()).cwiseSqrt();
   const auto changes = [&](int first, int count) {
@@ -88,6 +89,7 @@ replay::DataFindings judgeChange(const JointEstimate& a, const JointEstimate& b,
         .segment(first, count)
         .any();
   };
+  if (std::abs(change[kLater]) > kClock_s) return {};  // a clock was set
   std::string what;
   if (changes(kFocal, 1)) {
     what =
@@ -103,7 +105,7 @@ replay::DataFindings judgeChange(const JointEstimate& a, const JointEstimate& b,
         bias.y(), bias.z());
   }
   if (what.empty()) return {};
-  return {{Grade::kWarning, "rig_changes",
+  return {{Grade::kCause, "rig_changes",
            fmt::format("{}: from about {} ns on, {}; cut the drive there", a.state.camera.name,
                        toNanoseconds(middle), what)}};
 }
@@ -163,13 +165,13 @@ MotionCheck checkMotion(const replay::Recording& recording) {
       "ms, readout {:.1f} ± {:.1f} ms",
       tracks.images, joint.windows, found.fx, 100.0 * s[kFocal], 1e3 * found.time_offset_s,
       1e3 * s[kLater], 1e3 * found.readout_s, 1e3 * s[kReadout]);
-  constexpr double kChange_s = 0.015;
-  if (auto clocks = tools::judgeParts(joint.offsets, recording, kChange_s); !clocks.empty()) {
-    return {clocks, "the motion judges the clocks by " + shown};
-  }
   if (!even) {
     if (auto changes = checkHalves(tracks.windows, recording, options); !changes.empty())
       return {changes, "the motion judges the halves of the drive; together they show " + shown};
+  }
+  constexpr double kChange_s = 0.015;
+  if (auto clocks = tools::judgeParts(joint.offsets, recording, kChange_s); !clocks.empty()) {
+    return {clocks, "the motion judges the clocks by " + shown};
   }
   if (!isSure(joint, 1.0)) {
     return {{}, "the motion is too little to judge the lens and the stamps (" + shown + ")"};
