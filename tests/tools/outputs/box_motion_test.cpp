@@ -8,7 +8,7 @@
 
 #include "common/camera/camera_model.h"
 #include "common/math/so3.h"
-#include "tools/outputs/boxes/box_sizes.h"
+#include "tools/outputs/box_sizes.h"
 
 namespace perdure::tools {
 namespace {

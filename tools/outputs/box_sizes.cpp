@@ -1,4 +1,4 @@
-#include "tools/outputs/boxes/box_sizes.h"
+#include "tools/outputs/box_sizes.h"
 
 #include <fmt/format.h>
 
