@@ -168,7 +168,7 @@ DataFinding findingOf(const ClockChange& first, std::size_t count, const std::st
                         places, back ? "back" : "ahead", secondsText(first.added) + more)};
   }
   const bool judged = first.sensor == "imu" || first.sensor == "frame";
-  return {judged ? Grade::kFatal : Grade::kWarning, "clock_set_alone",
+  return {judged ? Grade::kFatal : Grade::kCause, "clock_set_alone",
           fmt::format("{}: the stamps of {} {} by {}{}", places, sensor,
                       back ? "go back" : "jump ahead", step, causeOfStep(first))};
 }
@@ -205,7 +205,7 @@ void dropShortPauses(Recording& recording) {
 
 void addSetAhead(const Recording& recording, const ClockChange& pause, DataFinding& finding) {
   if (!isSetAhead(recording, pause)) return;
-  finding.grade = isShort(pause) ? DataFinding::Grade::kWarning : DataFinding::Grade::kFatal;
+  finding.grade = isShort(pause) ? DataFinding::Grade::kCause : DataFinding::Grade::kFatal;
   finding.code = "clock_set_alone";
   finding.text = fmt::format(
       "{}: the stamps of {} jump ahead by {}, and end later by this time than "

@@ -244,7 +244,7 @@ void checkArrival(const std::vector<TimePoint>& images, DataFindings& findings) 
     return;
   const auto [least, most] = std::ranges::minmax(intervals);
   findings.push_back(
-      {DataFinding::Grade::kWarning, "stamps_of_arrival",
+      {DataFinding::Grade::kCause, "stamps_of_arrival",
        fmt::format("the intervals of the images vary from {:.0f} to {:.0f} ms, and a short one "
                    "follows a long one: the stamps are those of arrival, with a latency that "
                    "varies by {:.0f} ms (standard deviation); record the stamps of the sensor or "
@@ -272,7 +272,7 @@ bool checkBursts(const std::vector<TimePoint>& imu, DataFindings& findings) {
   constexpr double kMost = 100.0, kLongest_ms = 500.0;  // more are recorded at intervals
   if (packet > kMost || usual_ms * packet > kLongest_ms) return false;
   findings.push_back(
-      {DataFinding::Grade::kWarning, "imu_bursts",
+      {DataFinding::Grade::kCause, "imu_bursts",
        fmt::format("{:.0f} % of the inertial samples come {:.2g} ms after another, then none for "
                    "{:.3g} ms: their stamps are those of packets of {:.0f} samples (a FIFO); stamp "
                    "them at constant intervals of {:.4g} ms up to the last one of each packet",

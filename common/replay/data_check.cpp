@@ -82,7 +82,7 @@ void checkUpright(const Recording& recording, DataFindings& findings) {
   constexpr double kSurely = 0.8;  // cosine of 37°
   if (!(up_C.y() > kSurely)) return;
   findings.push_back(
-      {Grade::kWarning, "images_upside_down",
+      {Grade::kNote, "images_upside_down",
        fmt::format("{}: by T_BS and the accelerometer {} hangs so; where it does not, see T_BS and "
                    "the signs of the accelerometer (at rest it reads +9.8 along what points up)",
                    kUpsideDown, camera.name)});
@@ -150,7 +150,7 @@ void checkRepeatedSamples(const std::vector<ImuSample>& samples, DataFindings& f
   const bool all = run.count() == samples.size();  // made without noise
   if (all || run.count() <= kRepeated || samples[run.last].time - samples[run.first].time < kLeast)
     return;
-  findings.push_back({Grade::kWarning, "imu_repeats",
+  findings.push_back({Grade::kCause, "imu_repeats",
                       fmt::format("the IMU repeats one sample {}: its driver or its recorder "
                                   "stood still; cut the drive there",
                                   placeOf(run, samples))});
@@ -220,7 +220,7 @@ void checkStuckAxes(const std::vector<ImuSample>& samples, DataFindings& finding
       continue;
     const bool limit = isLimit(samples, run, axis);
     findings.push_back(
-        {Grade::kWarning, limit ? "imu_saturated" : "imu_axis_stuck",
+        {Grade::kCause, limit ? "imu_saturated" : "imu_axis_stuck",
          fmt::format("the {} reads exactly {:.6g} {} along {} {}{}", sensorOf(axis),
                      axisValue(samples[run.first], axis), unitOf(axis), "xyz"[axis % 3],
                      placeOf(run, samples),
@@ -251,7 +251,7 @@ void checkSpikes(const std::vector<ImuSample>& samples, DataFindings& findings) 
     }
     if (spikes == 0 || 50 * spikes > samples.size()) continue;
     findings.push_back(
-        {Grade::kWarning, "imu_spike",
+        {Grade::kCause, "imu_spike",
          fmt::format("the sample at {} ns{} reads {:.4g} {} about {} of the {}, its neighbours "
                      "{:.3g}: this is a transmission error; remove {}",
                      toNanoseconds(samples[first].time),
@@ -310,7 +310,7 @@ void checkSaturated(const std::vector<ImuSample>& samples, DataFindings& finding
         at.samples < at.near)
       continue;
     findings.push_back(
-        {Grade::kWarning, "imu_saturated",
+        {Grade::kCause, "imu_saturated",
          fmt::format(
              "the {} reads exactly {}{:.4g} {} about {} in {} samples ({:.0f} %) and never "
              "more: it is saturated; set a larger range of the sensor",

@@ -11,7 +11,8 @@
 namespace perdure::replay {
 
 struct DataFinding {
-  enum class Grade { kWarning, kFatal };
+  /// kNote: has no effect on results. kCause: later checks and vio would only show its consequences.
+  enum class Grade { kNote, kWarning, kCause, kFatal };
   Grade grade = Grade::kWarning;
   std::string code;  ///< short, stable, snake_case
   std::string text;  ///< a sentence, with the fix

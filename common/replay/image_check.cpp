@@ -188,7 +188,7 @@ void checkInverted(const FileList& all, const CameraCalibration& calibration,
       correlationOf(images[1], images[2]) > -kClearly ||
       correlationOf(images[0], images[2]) < kClearly)
     return;
-  findings.push_back({ImageGrade::kWarning, "images_inverted",
+  findings.push_back({ImageGrade::kCause, "images_inverted",
                       fmt::format("image {} of {} is the negative of the one before and of the one "
                                   "after it: invert the grey values of every second image (255 - "
                                   "value)",

@@ -177,7 +177,7 @@ replay::DataFindings judgeAxisFactors(const std::vector<Turn>& turns,
     const bool seen = camera.fx * std::sqrt(turning / count) > kMuch_px && left < kLeft * turning;
     const double least = kLeast + kSurely * std::sqrt(left / (count * all));
     if (!seen || shown <= 0.0 || std::abs(shown - 1.0) < least) continue;
-    return {{replay::DataFinding::Grade::kWarning, "gyro_axis_factor",
+    return {{replay::DataFinding::Grade::kCause, "gyro_axis_factor",
              fmt::format("the gyroscope's w_{} is {:.2f} times the turning about this axis that {} "
                          "shows, in {} pairs of images: see the scale of this column{}",
                          "xyz"[i], 1.0 / shown, camera.name, pairs.count(),

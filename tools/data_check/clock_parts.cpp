@@ -237,7 +237,7 @@ std::string textOf(const Jumps& jumps, const std::string& camera) {
 
 replay::DataFindings jumpsFinding(const Jumps& set, const std::string& camera) {
   return {
-      {replay::DataFinding::Grade::kWarning, "clock_step",
+      {replay::DataFinding::Grade::kCause, "clock_step",
        fmt::format("{}; without {}, gyroscope and images turn together: {}", textOf(set, camera),
                    set.size() == 1 ? "this step" : "these steps", kRemove)}};
 }
@@ -247,7 +247,7 @@ replay::DataFindings stepFinding(const Parts& parts, const Course& step,
   const PartOffset &before = parts[step.split - 1], &after = parts[step.split];
   // One part may be off, and long intervals blur the offsets.
   if (step.split < 2 || step.split + 2 > parts.size() || std::abs(step.change) < least_s) return {};
-  return {{replay::DataFinding::Grade::kWarning, "clock_step",
+  return {{replay::DataFinding::Grade::kCause, "clock_step",
            fmt::format("between {} and {} ns the clock of {} or of the IMU was set: gyroscope and "
                        "images turn together at an offset of {:.3f} s before and of {:.3f} s "
                        "after; {}",

@@ -177,7 +177,7 @@ std::optional<double> rateOfTurns(const std::vector<Turn>& turns,
 
 replay::DataFindings rateFinding(double rate, const CameraCalibration& camera) {
   return {
-      {DataFinding::Grade::kWarning, "clock_rate",
+      {DataFinding::Grade::kCause, "clock_rate",
        fmt::format("the clock of {} runs {:.2g} % too {} for that of the IMU by their turning: "
                    "see which of them has stamps that are counted or computed by a wrong "
                    "rate; if the images, multiply their times since the first by about {:.4f}",

@@ -144,10 +144,11 @@ replay::DataFindings judgeHalves(const replay::Recording& recording) {
   auto &first = halves[0].frames, &second = halves[1].frames;
   first.erase(first.begin() + middle, first.end());
   second.erase(second.begin(), second.begin() + middle);
-  const std::array<TurnCheck, 2> checks{TurnCheck(halves[0], false), TurnCheck(halves[1], false)};
+  std::array<TurnCheck, 2> checks{TurnCheck(halves[0], false), TurnCheck(halves[1], false)};
   for (const std::size_t bad : {1, 0}) {
     if (!checks[1 - bad].agrees(halves[1 - bad]) || checks[bad].findings.empty()) continue;
-    auto findings = checks[bad].findings;
+    auto findings = checkBackwards(halves[bad], checks[bad].known);
+    if (findings.empty()) findings = checks[bad].findings;
     findings.front().text =
         fmt::format("something changes in mid-drive: only {} {} ns, {}; cut the drive there",
                     bad == 1 ? "from about" : "until about", toNanoseconds(second.front().time),
@@ -211,13 +212,7 @@ replay::DataFindings checkDrive(const replay::Recording& recording, const replay
   add("repeated images", findings, [&] { return checkFrozenImages(recording); });
   add("what belongs together", findings, [&] { return checkPairs(recording); });
   add("the two cameras", findings, [&] { return checkStereo(recording); });
-  // With these, the rotations of images and gyroscope would differ too.
-  const bool known = std::ranges::any_of(findings, [](const auto& one) {
-    return one.code == "stamps_of_arrival" || one.code == "clock_set_alone" ||
-           one.code == "imu_axis_stuck" || one.code == "imu_spike" || one.code == "imu_block" ||
-           one.code == "imu_saturated";
-  });
-  if (!use.imu || known) return findings;
+  if (!use.imu || std::ranges::any_of(findings, isCause)) return findings;
   const std::size_t before = findings.size();
   add("turning", findings, [&] { return checkTurns(recording); });
   if (findings.size() == before)

@@ -17,6 +17,11 @@ replay::DataFindings checkDrive(const replay::Recording& recording, const replay
 replay::DataFindings checkPoses(const replay::Recording& recording, const replay::PoseFile& file,
                                 const replay::DataUse& use);
 
+/// Whether later checks and vio would only show the consequences of a finding.
+inline bool isCause(const replay::DataFinding& finding) {
+  return finding.grade == replay::DataFinding::Grade::kCause;
+}
+
 /// A list of {grade, code, text}.
 nlohmann::ordered_json toJson(const replay::DataFindings& findings);
 

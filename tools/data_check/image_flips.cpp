@@ -85,7 +85,7 @@ replay::DataFindings judgeFlips(const std::vector<Turn>& turns,
   if (names.empty()) return {};
   const std::string turned = turnedImu(signs, samples, camera);
   const std::string with = axesOf(signs, 1), unknown = axesOf(signs, 0);
-  return {{replay::DataFinding::Grade::kWarning, "images_flipped",
+  return {{replay::DataFinding::Grade::kCause, "images_flipped",
            fmt::format(
                "the images of {} seem to be {}: about the camera's {} they turn against the "
                "gyroscope{}{}; turn them back, or, if they are right, {}see T_BS and the signs of "

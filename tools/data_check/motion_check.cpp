@@ -306,7 +306,7 @@ replay::DataFindings judgePlace(const std::vector<Turn>& turns, const TurnIntegr
   if (given < kShown) return {};
   if (const auto later = betterOffset(turns, gyro, camera, kLongestOffset_s, kOffsetClearly)) {
     return {
-        {DataFinding::Grade::kWarning, "time_offset",
+        {DataFinding::Grade::kCause, "time_offset",
          fmt::format("the stamps of {} and of the IMU do not fit: set time_offset_s to {:.2f}, and "
                      "see which clock is wrong",
                      camera.name, *later)}};

@@ -65,10 +65,6 @@ std::vector<Change> changesOfPixels(const CameraModel& camera, const Box& all) {
           fmt::format("divide by {:.4g}, then subtract {:.0f} from y1 and y2", s, above)},
          changeOf({1 / s, 0, 0, 1 / s}, {0, -above})});
   }
-  for (const double factor :
-       {0.5, 0.67, 0.75, 0.8, 0.9, 0.95, 1.05, 1.1, 1.25, 1.33, 1.5, 2.0, 3.0, 4.0}) {
-    changes.push_back(scaled(factor, factor, ", roughly"));
-  }
   return changes;
 }
 
@@ -168,22 +164,21 @@ std::optional<Fit> fitOf(const Change& change, const Givens& all, const Frames& 
 }
 
 /// The best of the changes, with the others that fit equally well.
-std::optional<Change> bestOf(const std::vector<Change>& changes, const Givens& given,
-                             const Frames& frames, const CameraModel& camera) {
+std::optional<Fit> bestOf(const std::vector<Change>& changes, const Givens& given,
+                          const Frames& frames, const CameraModel& camera) {
   constexpr double kEqual = 1.1;  // ratio of residuals that do not distinguish two changes
   std::vector<Fit> fits;
   for (const Change& change : changes) {
     if (auto fit = fitOf(change, given, frames, camera)) fits.push_back(*std::move(fit));
   }
   if (fits.empty()) return std::nullopt;
-  const Fit& best = *std::ranges::min_element(fits, {}, &Fit::residual);
-  Change change = best.change;
+  Fit best = *std::ranges::min_element(fits, {}, &Fit::residual);
+  const auto [least, first] = best;
   for (const Fit& fit : fits) {
-    const bool other = fit.change.doubt.what != best.change.doubt.what;
-    if (other && fit.residual < kEqual * best.residual)
-      change.doubt.fix += "; or, with equal evidence, " + fit.change.doubt.what;
+    if (fit.change.doubt.what != first.doubt.what && fit.residual < kEqual * least)
+      best.change.doubt.fix += "; or, with equal evidence, " + fit.change.doubt.what;
   }
-  return change;
+  return best;
 }
 
 std::string axisText(const char* axis, double scale, double sigma, double shift_px,
@@ -199,8 +194,7 @@ std::string axisText(const char* axis, double scale, double sigma, double shift_
 }
 
 /// The estimated scale and shift of the boxes, if they are clearly wrong.
-std::optional<Change> estimated(const Givens& given, const Frames& frames,
-                                const CameraModel& camera) {
+std::optional<Fit> estimated(const Givens& given, const Frames& frames, const CameraModel& camera) {
   std::vector<const BoxTrack*> tracks;
   for (const Given& one : given) tracks.push_back(one.track);
   const auto found = correctionOf(tracks, frames, camera);
@@ -215,15 +209,17 @@ std::optional<Change> estimated(const Givens& given, const Frames& frames,
                                                       : "boxes are of scaled and shifted images";
   constexpr double kMost = 0.93;
   const Change change{{what, x + (x.empty() || y.empty() ? "" : "; ") + y}, found->change()};
-  const auto fit = fitOf(change, given, frames, camera, kMost);
-  return fit ? std::optional(fit->change) : std::nullopt;
+  return fitOf(change, given, frames, camera, kMost);
 }
 
 /// The change that makes the boxes agree with the poses.
 std::optional<Change> changeIn(const Givens& given, const std::vector<Change>& changes,
                                const Frames& frames, const CameraModel& camera) {
+  constexpr double kClearly = 0.8;  // an estimate explains a little more than an exact change
   auto best = bestOf(changes, given, frames, camera);
-  return best ? best : estimated(given, frames, camera);
+  const auto other = estimated(given, frames, camera);
+  if (other && (!best || other->residual < kClearly * best->residual)) best = other;
+  return best ? std::optional(best->change) : std::nullopt;
 }
 
 /// Returns a change of one part of the drive only, with the frame that separates the parts.
@@ -232,8 +228,8 @@ std::optional<Change> changeInPart(const Givens& given, const std::vector<Change
   constexpr std::size_t kLeast = 20;
   if (given.size() < 2 * kLeast) return std::nullopt;
   const auto middle = given.begin() + static_cast<std::ptrdiff_t>(given.size() / 2);
-  const auto first = bestOf(changes, Givens(given.begin(), middle), frames, camera),
-             second = bestOf(changes, Givens(middle, given.end()), frames, camera);
+  const auto first = changeIn(Givens(given.begin(), middle), changes, frames, camera),
+             second = changeIn(Givens(middle, given.end()), changes, frames, camera);
   if (first.has_value() == second.has_value()) return std::nullopt;
   Change change = first ? *first : *second;
   // The sum of the improvements has its largest or smallest value at the frame of the change.
@@ -249,6 +245,35 @@ std::optional<Change> changeInPart(const Givens& given, const std::vector<Change
   return change;
 }
 
+/// A doubt if most tracks contradict the poses of their frames, and agree no better with these than
+/// with the poses of frames half a drive away.
+std::optional<Doubt> doubtOfDrive(const Givens& all, const Frames& frames,
+                                  const CameraModel& camera) {
+  constexpr std::size_t kLeast = 20;
+  constexpr double kMoving = 0.3, kNoBetter = 0.6;
+  if (all.size() < kLeast) return std::nullopt;
+  const auto half = static_cast<std::int64_t>(frames.rbegin()->first / 2);
+  std::vector<double> residuals;
+  double better = 0.0;
+  for (const Given& given : all) {
+    const bool early = static_cast<std::int64_t>(given.track->front().frame) < half;
+    const auto off = deviationsOf(*given.track, {.shift = early ? half : -half}, frames, camera);
+    if (!off) continue;
+    residuals.push_back(given.residual);
+    const double other = residualOf(*off);
+    better += given.residual < other ? 1.0 : given.residual > other ? 0.0 : 0.5;
+  }
+  const auto tracks = static_cast<double>(residuals.size());
+  if (residuals.size() < kLeast || better > kNoBetter * tracks ||
+      medianOf(std::move(residuals)) < kMoving)
+    return std::nullopt;
+  return Doubt{"boxes contradict the poses",
+               fmt::format("{:.0f} tracks of boxes do not move as the poses predict, and move no "
+                           "better with their own frames' poses than with others: the boxes are "
+                           "of another drive or camera, or the poses are",
+                           tracks)};
+}
+
 }  // namespace
 
 std::optional<Doubt> doubtOfBoxes(const Frames& frames, const CameraCalibration& calibration) {
@@ -261,7 +286,7 @@ std::optional<Doubt> doubtOfBoxes(const Frames& frames, const CameraCalibration&
   std::ranges::move(changesOfNumbers(frames), std::back_inserter(changes));
   auto change = changeIn(given, changes, frames, camera);
   if (!change) change = changeInPart(given, changes, frames, camera);
-  return change ? std::optional(change->doubt) : std::nullopt;
+  return change ? std::optional(change->doubt) : doubtOfDrive(given, frames, camera);
 }
 
 }  // namespace perdure::tools

@@ -2,10 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cstdio>
-#include <iterator>
-#include <utility>
 
 namespace perdure::tools {
 namespace {
@@ -42,43 +39,8 @@ std::string sentenceOf(const Doubt& doubt) { return doubt.what + ": " + doubt.fi
 
 Doubts doubtsOfFindings(const replay::DataFindings& findings) {
   Doubts doubts;
-  constexpr std::pair<const char*, const char*> kFindings[] = {
-      {"clock_wrapped", "stamps were changed"},
-      {"clock_set", "stamps were changed"},
-      {"clock_step", "one clock was set during the drive"},
-      {"clock_rate", "the clocks of camera and IMU run at different rates"},
-      {"stamps_of_arrival", "the images have stamps of arrival"},
-      {"motion_", "the motion contradicts the rig"},
-      {"gyro_factor", "the scale of the gyroscope, or the focal length, does not fit"},
-      {"imu_bursts", "the inertial samples have stamps of packets"},
-      {"imu_saturated", "the IMU is saturated"},
-      {"imu_axis_stuck", "an axis of the IMU keeps one value"},
-      {"imu_gap", "inertial samples are missing"},
-      {"imu_spike", "samples of the IMU are corrupt"},
-      {"imu_block", "samples of the IMU are corrupt"},
-      {"accel_factor", "the accelerometer's scale or bias is wrong"},
-      {"accel_changes", "the accelerometer changes during the drive"},
-      {"images_inverted", "images are inverted"},
-      {"images_change_size", "images have different sizes"},
-      {"gyro_", "gyroscope and images contradict each other"},
-      {"time_offset", "camera and IMU do not agree in time"},
-      {"images_flipped", "the images are mirrored or upside down"},
-      {"clock_", "stamps pause or jump"},
-      {"declared_rates", "sensor rates differ from the declared ones"},
-      {"imu_covers_part", "images lie outside of the inertial samples"},
-      {"images_frozen", "the images do not change"},
-      {"images_denied", "images may not be read"},
-      {"images_repeated", "images are repeated"},
-      {"lines_lost", "lines of the recording were not used"},
-      {"boxes_beyond", "boxes of other frames were not used"},
-      {"boxes_outside", "boxes do not fit the size of the images"},
-      {"classes_unknown", "classes of boxes are not known"},
-      {"imu_repeats", "the IMU repeats one sample"},
-      {"poses_", "the poses contradict the drive"}};
-  for (const auto& finding : findings) {
-    const auto kind = std::ranges::find_if(
-        kFindings, [&](const auto& one) { return finding.code.starts_with(one.first); });
-    if (kind != std::end(kFindings)) doubts.push_back({kind->second, finding.text});
+  for (const auto& [grade, code, text] : findings) {
+    if (grade != replay::DataFinding::Grade::kNote) doubts.push_back({code, text});
   }
   return doubts;
 }

@@ -247,6 +247,7 @@ void Pipeline::finish() {
   outputs_->finish();
   if (const auto& cameras = dataset_->calibration().cameras; detection_file_ && !cameras.empty())
     box_doubt_ = doubtOfBoxes(outputs_->log().frames(), cameras.front());
+  if (detection_file_ && !box_doubt_) box_doubt_ = doubtOfHeights(estimatedHeights());
   if (graph_waits_) {
     askForGraph();
     map_->work();

@@ -21,6 +21,7 @@
 #include "services/vio/known_pose_node.h"
 #include "services/vio/node.h"
 #include "tools/calibrate/rig_check.h"
+#include "tools/outputs/box_sizes.h"
 #include "tools/outputs/output_writer.h"
 #include "tools/outputs/run_doubts.h"
 #include "tools/outputs/stage_timer.h"
@@ -103,6 +104,7 @@ class Pipeline {
   void checkData();
   void checkDetectionFile();
   void checkClasses(const semantic_filter::ClassPriors& priors);
+  std::vector<EstimatedHeight> estimatedHeights() const;
   void judgeMotion();
   void refuseUnwritten() const;
   // These functions are in pipeline_recorded.cpp.

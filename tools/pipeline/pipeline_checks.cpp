@@ -114,13 +114,13 @@ void Pipeline::checkData() {
   if (options_.odometry == "vio" || options_.landmarks) {
     const auto unknown = vio::unknownCamera(configs_.vio, dataset_->calibration());
     if (!unknown.empty()) {
-      findings_.push_back({replay::DataFinding::Grade::kWarning, "camera_unknown",
+      findings_.push_back({replay::DataFinding::Grade::kNote, "camera_unknown",
                            unknown + "; set vio.input.cameras to these"});
     }
   }
   if (isSimulated(options_.data)) {
     if (const auto lack = lackOfTruth(options_.data, *dataset_); !lack.empty())
-      findings_.push_back({replay::DataFinding::Grade::kWarning, "truth_incomplete",
+      findings_.push_back({replay::DataFinding::Grade::kNote, "truth_incomplete",
                            lack + "; the report has no scores"});
   }
   replay::refuseFatal(findings_, options_.data);
@@ -198,6 +198,21 @@ void Pipeline::checkClasses(const semantic_filter::ClassPriors& priors) {
       {replay::DataFinding::Grade::kWarning, "classes_unknown",
        fmt::format("{}: no size is known of the class {}; {} lists those that are known; add it",
                    options_.detections, names, configs_.semantic_filter.class_priors)});
+}
+
+std::vector<EstimatedHeight> Pipeline::estimatedHeights() const {
+  constexpr int kHeight = 6;
+  const auto priors = semantic_filter::loadPriors(configs_.semantic_filter);
+  std::vector<EstimatedHeight> heights;
+  for (const auto& object : outputs_->history().lastBeliefs()) {
+    const ClassBelief& best = object.best();
+    const auto& prior = priors.of(best.name);
+    if (!object.confirmed || prior.name.empty()) continue;
+    heights.push_back({best.mean[kHeight] - prior.log_size.z(),
+                       std::sqrt(best.covariance(kHeight, kHeight)),
+                       std::sqrt(prior.log_size_covariance(2, 2))});
+  }
+  return heights;
 }
 
 void Pipeline::refuseUnwritten() const {

@@ -92,7 +92,7 @@ TEST(ClockCheck, APauseOfBothSensorsIsNoFault) {
 
 TEST(ClockCheck, AShortJumpAheadOfOneClockIsSaidAndLostImagesAreNot) {
   for (const int ms : {400, 700, 950}) {
-    EXPECT_THAT(finding(readWith(kSame, setBy(milliseconds(ms))), DataFinding::Grade::kWarning,
+    EXPECT_THAT(finding(readWith(kSame, setBy(milliseconds(ms))), DataFinding::Grade::kCause,
                         "clock_set_alone"),
                 HasSubstr("images.csv, message 101: the stamps of the images jump ahead by"))
         << ms;
@@ -105,7 +105,7 @@ TEST(ClockCheck, AShortJumpAheadOfOneClockIsSaidAndLostImagesAreNot) {
       return inside ? seconds(110) - milliseconds(100) : time;
     };
     const auto drive = readWith(kSame, lost);
-    EXPECT_EQ(finding(drive, DataFinding::Grade::kWarning, "clock_set_alone"), "none");
+    EXPECT_EQ(finding(drive, DataFinding::Grade::kCause, "clock_set_alone"), "none");
     EXPECT_EQ(finding(drive, DataFinding::Grade::kWarning, "clock_paused"), "none");
   }
 }
@@ -171,14 +171,14 @@ TEST(ClockCheck, StampsOfArrivalAreSaidAndAChangedFrameRateIsNone) {
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> latency(0.0, 0.045);
   const auto late = [&](Duration time) { return time + durationFromSeconds(latency(random)); };
-  EXPECT_THAT(finding(readWith(kSame, late), DataFinding::Grade::kWarning, "stamps_of_arrival"),
+  EXPECT_THAT(finding(readWith(kSame, late), DataFinding::Grade::kCause, "stamps_of_arrival"),
               HasSubstr("a latency that varies by 15 ms"));
   const auto slower = [](Duration time) {
     return time + (time > seconds(105) ? (time - seconds(105)) / 2 : Duration{0});
   };
   const auto lossy = [](Duration time) { return time + time / seconds(2) * milliseconds(100); };
   for (const Stamp& images : {Stamp(kSame), Stamp(slower), Stamp(lossy)}) {
-    EXPECT_EQ(finding(readWith(kSame, images), DataFinding::Grade::kWarning, "stamps_of_arrival"),
+    EXPECT_EQ(finding(readWith(kSame, images), DataFinding::Grade::kCause, "stamps_of_arrival"),
               "none");
   }
 }
@@ -188,7 +188,7 @@ TEST(ClockCheck, SamplesOfAFifoAreSaidWithTheirInterval) {
     return time / milliseconds(100) * milliseconds(100) + time % milliseconds(100) / 500;
   };
   EXPECT_THAT(
-      finding(readWith(packets, kSame), DataFinding::Grade::kWarning, "imu_bursts"),
+      finding(readWith(packets, kSame), DataFinding::Grade::kCause, "imu_bursts"),
       HasSubstr("packets of 10 samples (a FIFO); stamp them at constant intervals of 10 ms"));
 }
 

@@ -163,6 +163,22 @@ TEST(FaultySensors, ImagesThatAreMirroredFromMidDriveOnAreNamedWithTheTime) {
                              HasSubstr("mirrored left to right")));
 }
 
+TEST(FaultySensors, ImagesInReverseOrderFromMidDriveOnAreNamedWithTheTime) {
+  TurningDrive drive;
+  drive.seconds = 16.0;
+  std::vector<cv::Mat> later;
+  const auto keep = [&](const cv::Mat& image) { return later.emplace_back(image.clone()); };
+  changedFromHalf("reversed_from_half", drive, keep);
+  const auto last = [&](const cv::Mat&) {
+    const cv::Mat image = later.back();
+    later.pop_back();
+    return image;
+  };
+  EXPECT_THAT(findingIn(changedFromHalf("reversed_from_half", drive, last), "images_backwards"),
+              testing::AllOf(HasSubstr("something changes in mid-drive: only from about 100000000"),
+                             HasSubstr("listed in reverse order")));
+}
+
 TEST(FaultySensors, ImagesThatChangeTheirSizeAreNamedWithTheFrame) {
   const auto root = changedFromHalf("size_from_half", {}, [](const cv::Mat& image) {
     cv::Mat half;

@@ -8,6 +8,7 @@
 
 #include "common/camera/camera_model.h"
 #include "common/math/so3.h"
+#include "tools/outputs/box_sizes.h"
 
 namespace perdure::tools {
 namespace {
@@ -176,6 +177,31 @@ TEST(BoxMotion, AShiftIsEstimatedWithoutBordersThatShowIt) {
                 return Box{b.x1 + 16, b.y1, std::min(319.0, b.x2 + 16), b.y2};
               }),
               testing::AllOf(HasSubstr("boxes are shifted"), HasSubstr("add -1")));
+}
+
+TEST(BoxMotion, BoxesOfAnotherDriveContradictThePoses) {
+  Frames frames = drive();
+  for (auto& [number, frame] : frames) {
+    const double t = static_cast<double>(number) / 40.0;
+    frame.T_WB = {expSo3(Eigen::Vector3d(0, 0.1 * std::cos(t), 0.5 * std::sin(3.1 * t + 1.0))),
+                  Eigen::Vector3d(0, 0.7 * t, 0)};
+  }
+  const auto doubt = doubtOfBoxes(frames, camera());
+  ASSERT_TRUE(doubt);
+  EXPECT_EQ(doubt->what, "boxes contradict the poses");
+}
+
+TEST(BoxHeights, AreThoseOfTheirClasses) {
+  const auto doubtAt = [](double excess) {
+    const auto doubt = doubtOfHeights(std::vector<EstimatedHeight>(20, {excess, 0.05, 0.18}));
+    return doubt ? doubt->what : "";
+  };
+  EXPECT_EQ(doubtAt(0.1), "");
+  EXPECT_EQ(doubtAt(-0.1), "");
+  EXPECT_EQ(doubtAt(0.3), "objects are too large");
+  EXPECT_EQ(doubtAt(-0.4), "objects are too small");
+  EXPECT_FALSE(doubtOfHeights(std::vector<EstimatedHeight>(9, {0.5, 0.05, 0.18}))) << "too few";
+  EXPECT_FALSE(doubtOfHeights(std::vector<EstimatedHeight>(20, {0.1, 0.17, 0.18}))) << "the prior";
 }
 
 TEST(BoxMotion, AChangeInMidDriveIsNamedWithItsFrame) {

@@ -139,7 +139,7 @@ TEST(PipelineRefusal, DetectionsThatCountFromOneAreRefusedAndBoxesBeyondTheDrive
   EXPECT_THAT(endOf(options), testing::Pair(HasSubstr("1 … 41, those of the drive 0 … 40"), 65));
   writeText(options.detections, header + "0" + box + "40" + box + "60" + box);
   const Pipeline pipeline(options);
-  EXPECT_THAT(endOfLine(pipeline.doubts()), HasSubstr("boxes of other frames were not used"));
+  EXPECT_THAT(endOfLine(pipeline.doubts()), HasSubstr("boxes_beyond"));
   EXPECT_THAT(pipeline.findings().back().text, HasSubstr("1 of 3 boxes"));
 }
 
@@ -153,7 +153,7 @@ TEST(PipelineRefusal, UnknownClassesAreSaid) {
   }
   writeText(options.detections, text);
   const Pipeline pipeline(options);
-  EXPECT_THAT(endOfLine(pipeline.doubts()), HasSubstr("classes of boxes are not known"));
+  EXPECT_THAT(endOfLine(pipeline.doubts()), HasSubstr("classes_unknown"));
   EXPECT_THAT(pipeline.findings().back().text,
               AllOf(HasSubstr("2 (20 boxes, a number: write the name)"),
                     HasSubstr("bicycl (1 boxes; do you mean bicycle?)")));

@@ -49,16 +49,6 @@ void checkPosesOf(const Drive& drive, const replay::Recording& recording, Findin
   }
 }
 
-/// Whether vio would only show the consequences of a finding.
-bool isCause(const replay::DataFinding& finding) {
-  constexpr const char* kCauses[] = {
-      "focal_length",   "time_offset",   "readout",          "clock_step",     "clock_set_alone",
-      "clock_rate",     "imu_bursts",    "imu_repeats",      "images_flipped", "stamps_of_arrival",
-      "imu_axis_stuck", "imu_spike",     "gyro_axis_factor", "imu_block",      "imu_saturated",
-      "accel_factor",   "accel_changes", "images_inverted"};
-  return std::ranges::any_of(kCauses, [&](const char* code) { return finding.code == code; });
-}
-
 /// Adds the findings about the rig from the motion, which are the most exact ones.
 void checkMotionOf(const replay::Recording& recording, replay::DataFindings& of_data,
                    Findings& findings) {

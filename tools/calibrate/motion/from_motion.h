@@ -48,7 +48,7 @@ MotionRig writeMotionRig(const replay::DatasetOptions& drive, const WindowOption
                          const std::filesystem::path& file);
 
 struct MotionCheck {
-  replay::DataFindings findings;  ///< codes: focal_length, time_offset, readout
+  replay::DataFindings findings;  ///< codes: focal_length, time_offset, readout, rig_changes
   /// The motion that the comparison is based on, or why no comparison is possible.
   std::string basis;
 };

@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <opencv2/core/utility.hpp>
 
@@ -83,6 +84,7 @@ class Problem {
   Window advanced(const Window& window, const Reduced<N>& reduced,
                   const Eigen::Matrix<double, N - kOwn, 1>& step, double length) const;
   JointVector sigmaOf(const std::vector<Reduced<kShared>>& all);
+  JointVector changeOf(const std::vector<Reduced<kShared>>& all) const;
   /// The time offset that explains a window best, with the other parameters of all windows.
   tools::PartOffset offsetOf(Window window) const;
   std::vector<tools::PartOffset> offsets() const;
@@ -275,6 +277,18 @@ JointVector Problem::sigmaOf(const std::vector<Reduced<kShared>>& all) {
   return (sandwich.cwiseMax(bound) + of_prior).cwiseSqrt();
 }
 
+/// The step that the later half of the windows asks for, minus that of the earlier half.
+JointVector Problem::changeOf(const std::vector<Reduced<kShared>>& all) const {
+  std::array<Joint, 2> halves;
+  for (Joint& half : halves) half = {JointMatrix(priorWeights().asDiagonal()), JointVector::Zero()};
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const Joint one = jointOf(all[i]);
+    Joint& half = halves[2 * i < all.size() ? 0 : 1];
+    half.H += one.H, half.g += one.g;
+  }
+  return halves[0].H.ldlt().solve(halves[0].g) - halves[1].H.ldlt().solve(halves[1].g);
+}
+
 /// Scales the deviations by the differences between neighbours, on which a clock has little effect.
 /// Their mean would contain the effect of a clock on the residuals.
 void scaleBySpread(std::vector<tools::PartOffset>& offsets) {
@@ -358,7 +372,9 @@ JointEstimate Problem::solve() {
   descend();
   sigmaOf(reduceAll());  // sets the weight of the priors
   descend();
-  out.sigma = sigmaOf(reduceAll());
+  const auto reduced = reduceAll();
+  out.sigma = sigmaOf(reduced);
+  out.change = changeOf(reduced);
   out.offsets = offsets();
   out.state = state_;
   out.windows = windows_.size();

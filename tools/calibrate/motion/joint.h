@@ -45,6 +45,8 @@ struct JointOptions {
 struct JointEstimate {
   JointState state;
   JointVector sigma;         ///< standard deviations, scaled by the residuals
+  /// From the earlier to the later half of the windows, by one step.
+  JointVector change = JointVector::Zero();
   double residual_px = 0.0;  ///< robust standard deviation of a residual
   double inliers = 0.0;      ///< share of the residuals below three of these
   std::size_t windows = 0, residuals = 0;

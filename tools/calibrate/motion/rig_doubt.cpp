@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -34,8 +35,8 @@ replay::DataFindings judge(const CameraCalibration& given, const JointEstimate& 
     return std::abs(change) > std::max(least, kSurely * sigma);
   };
   const auto add = [&](const char* code, const std::string& text) {
-    findings.push_back({Grade::kWarning, code,
-                        text + "; or let perdure calibrate from-motion find the whole rig"});
+    findings.push_back(
+        {Grade::kCause, code, text + "; or let perdure calibrate from-motion find the whole rig"});
   };
   if (differs(found.fx / given.fx - 1.0, kLeastShare, s[kFocal])) {
     add("focal_length",
@@ -61,15 +62,72 @@ replay::DataFindings judge(const CameraCalibration& given, const JointEstimate& 
   return findings;
 }
 
-}  // namespace
-
-namespace {
-
 /// Whether the standard deviations are at most `share` of the largest that permit a judgement.
 bool isSure(const JointEstimate& joint, double share) {
   constexpr double kSureShare = 0.01, kSure_s = 0.004, kResidual_px = 2.0, kInliers = 0.6;
   return joint.sigma[kFocal] < share * kSureShare && joint.sigma[kLater] < share * kSure_s &&
          joint.residual_px < kResidual_px && joint.inliers >= kInliers;
+}
+
+/// Least changes that are reported: rotation in rad, bias in rad/s, relative focal length.
+JointVector leastChange() {
+  JointVector least = JointVector::Constant(std::numeric_limits<double>::infinity());
+  least.segment<3>(kTurnOf).setConstant(0.03);
+  least.segment<3>(kBias).setConstant(0.04);
+  least[kFocal] = 0.08;
+  return least;
+}
+
+/// Judges what differs between the estimates of the two halves of a drive.
+replay::DataFindings judgeChange(const JointEstimate& a, const JointEstimate& b, TimePoint middle) {
+  constexpr double kClearly = 6.0;  // standard deviations; those of few windows are uncertain
+  constexpr double kClock_s = 0.01;
+  const JointVector change = between(a.state, b.state), least = leastChange(),
+                    sigma = (a.sigma.cwiseAbs2() + b.sigma.cwiseAbs2()).cwiseSqrt();
+  const auto changes = [&](int first, int count) {
+    return (change.array().abs() > least.array().max(kClearly * sigma.array()))
+        .segment(first, count)
+        .any();
+  };
+  if (std::abs(change[kLater]) > kClock_s) return {};  // a clock was set
+  std::string what;
+  if (changes(kFocal, 1)) {
+    what =
+        fmt::format("its focal length changes from {:.0f} to {:.0f} px (zoom, or cropped images)",
+                    a.state.camera.fx, b.state.camera.fx);
+  } else if (changes(kTurnOf, 3)) {
+    what = fmt::format("its rotation on the IMU changes by {:.1f}° (the mount is loose)",
+                       change.segment<3>(kTurnOf).norm() * 180.0 / M_PI);
+  } else if (changes(kBias, 3)) {
+    const Eigen::Vector3d bias = change.segment<3>(kBias);
+    what = fmt::format(
+        "the bias of the gyroscope changes by {:.2f}, {:.2f}, {:.2f} rad/s about x, y, z", bias.x(),
+        bias.y(), bias.z());
+  }
+  if (what.empty()) return {};
+  return {{Grade::kCause, "rig_changes",
+           fmt::format("{}: from about {} ns on, {}; cut the drive there", a.state.camera.name,
+                       toNanoseconds(middle), what)}};
+}
+
+/// Whether both halves of the windows ask for the same values.
+bool isEven(const JointEstimate& joint) {
+  constexpr double kShown = 0.5;  // a step from the common estimate shows a part of a change
+  return (joint.change.array().abs() < kShown * leastChange().array()).all();
+}
+
+/// Estimates the two halves of the drive separately.
+replay::DataFindings checkHalves(const std::vector<TrackWindow>& windows,
+                                 const replay::Recording& recording, const JointOptions& options) {
+  constexpr std::size_t kFewest = 3;
+  const TimePoint middle = recording.frames[recording.frames.size() / 2].time;
+  std::array<std::vector<TrackWindow>, 2> halves;
+  for (const TrackWindow& window : windows) {
+    halves[window.times.front() < middle ? 0 : 1].push_back(window);
+  }
+  if (std::min(halves[0].size(), halves[1].size()) < kFewest) return {};
+  return judgeChange(estimateJointly(halves[0], recording.imu, options),
+                     estimateJointly(halves[1], recording.imu, options), middle);
 }
 
 }  // namespace
@@ -91,8 +149,9 @@ MotionCheck checkMotion(const replay::Recording& recording) {
   };
   // Half of the windows suffices if it shows no error with half the permitted deviations. The other
   // half is also skipped if the deviations are over twice the permitted ones.
-  const bool first = estimate(), sure = first && isSure(joint, 0.5) && judge(given, joint).empty();
-  if (!sure && (!first || isSure(joint, 2.0))) {
+  const bool first = estimate(), even = first && isEven(joint),
+             sure = even && isSure(joint, 0.5) && judge(given, joint).empty();
+  if (!sure && (!even || isSure(joint, 2.0))) {
     tracks.add(trackWindows(
         recording, {.most = kWindows - kFewest, .skip = kFewest, .spacing_s = kSpacing_s}));
     if (!estimate()) {
@@ -106,6 +165,10 @@ MotionCheck checkMotion(const replay::Recording& recording) {
       "ms, readout {:.1f} ± {:.1f} ms",
       tracks.images, joint.windows, found.fx, 100.0 * s[kFocal], 1e3 * found.time_offset_s,
       1e3 * s[kLater], 1e3 * found.readout_s, 1e3 * s[kReadout]);
+  if (!even) {
+    if (auto changes = checkHalves(tracks.windows, recording, options); !changes.empty())
+      return {changes, "the motion judges the halves of the drive; together they show " + shown};
+  }
   constexpr double kChange_s = 0.015;
   if (auto clocks = tools::judgeParts(joint.offsets, recording, kChange_s); !clocks.empty()) {
     return {clocks, "the motion judges the clocks by " + shown};

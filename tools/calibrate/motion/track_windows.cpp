@@ -1,6 +1,7 @@
 #include "tools/calibrate/motion/track_windows.h"
 
 #include <algorithm>
+#include <array>
 #include <future>
 
 #include "common/replay/data_check.h"
@@ -12,6 +13,7 @@ namespace {
 
 using Frames = std::vector<const replay::Recording::FrameFile*>;
 using Run = std::pair<std::size_t, std::size_t>;  ///< first frame, and one past the last
+using RatedRun = std::pair<Run, Eigen::Vector3d>;
 
 constexpr std::size_t kFewestTracks = 15, kMostTracks = 40, kMostImages = 7;
 
@@ -36,11 +38,23 @@ Eigen::Vector3d rotationIn(const Frames& frames, const Run& run, const tools::Tu
   return squares;
 }
 
+/// Takes the runs of both halves of the drive in turn, because something may change in mid-drive.
+void alternate(std::vector<RatedRun>& runs, std::size_t middle) {
+  std::array<std::vector<RatedRun>, 2> halves;
+  for (const RatedRun& run : runs) halves[run.first.first < middle ? 0 : 1].push_back(run);
+  runs.clear();
+  for (std::size_t i = 0; i < std::max(halves[0].size(), halves[1].size()); ++i) {
+    for (const auto& half : halves) {
+      if (i < half.size()) runs.push_back(half[i]);
+    }
+  }
+}
+
 /// The runs with the largest rotations; each axis counts relative to its mean.
 std::vector<Run> runsOf(const Frames& frames, const std::vector<ImuSample>& samples,
                         const WindowOptions& options) {
   const tools::TurnIntegral gyro(samples);
-  std::vector<std::pair<Run, Eigen::Vector3d>> all;
+  std::vector<RatedRun> all;
   Eigen::Vector3d mean = Eigen::Vector3d::Constant(1e-12);
   for (std::size_t begin = 0; begin < frames.size();) {
     std::size_t end = begin + 1;
@@ -57,6 +71,7 @@ std::vector<Run> runsOf(const Frames& frames, const std::vector<ImuSample>& samp
   }
   const auto score = [&](const auto& one) { return one.second.cwiseQuotient(mean).sum(); };
   std::ranges::stable_sort(all, [&](const auto& a, const auto& b) { return score(a) > score(b); });
+  alternate(all, frames.size() / 2);
   all.erase(all.begin(), all.begin() + static_cast<long>(std::min(all.size(), options.skip)));
   all.resize(std::min(all.size(), options.most));
   std::vector<Run> runs;

@@ -70,7 +70,7 @@ replay::DataFindings judgeSize(const MeanForces& forces) {
                     std::abs(off) < kMost * kGravity_m_s2 &&
                     sizes.most - sizes.least < kEqual * std::abs(off);
   if (forces.size() < kFewest || !sure) return {};
-  return {{replay::DataFinding::Grade::kWarning, "accel_factor",
+  return {{replay::DataFinding::Grade::kCause, "accel_factor",
            fmt::format("the mean force is {:.2f} to {:.2f} m/s² in all of {} stretches, where "
                        "gravity is 9.81: the accelerometer's scale along {}, which points up or "
                        "down, is {:.3f} times the right one, or it has a bias of {:.2f} m/s²; "
@@ -118,7 +118,7 @@ replay::DataFindings judgeForceChange(const MeanForces& forces) {
         !turned ? fmt::format("from {:.2f} to {:.2f} m/s²", before.middle(), after.middle())
                 : fmt::format("its direction by {:.0f}°, which the gyroscope does not show",
                               angle * 180.0 / M_PI);
-    return {{replay::DataFinding::Grade::kWarning, "accel_changes",
+    return {{replay::DataFinding::Grade::kCause, "accel_changes",
              fmt::format("the mean force changes {} between {} and {} ns: from there on, a sign, "
                          "the scale, the bias or the columns of the accelerometer are others, or "
                          "it came loose; cut the drive there",

@@ -147,7 +147,7 @@ replay::DataFindings checkSampleBlocks(const replay::Recording& recording) {
     if (blocks.empty()) continue;
     const SampleBlock& block = blocks.front();
     return {
-        {replay::DataFinding::Grade::kWarning, "imu_block",
+        {replay::DataFinding::Grade::kCause, "imu_block",
          fmt::format(
              "the {} reads {:.4g} {} about {} in {} sample{} from {} ns (number {}), jumps there "
              "and back at once{}, while {}: corrupt data; remove these lines",

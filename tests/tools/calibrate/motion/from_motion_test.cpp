@@ -192,5 +192,20 @@ TEST(MotionCheck, NamesAWrongFocalLengthOffsetAndReadout) {
   EXPECT_EQ(check("motion_rows", [](CameraCalibration& c) { c.readout_s = 0.03; }), "readout ");
 }
 
+TEST(MotionCheck, NamesAGyroscopeWhoseBiasChangesInMidDrive) {
+  tests::TurningDrive drive;
+  drive.seconds = 12.0;
+  drive.change = [number = 0](ImuSample& sample) mutable {
+    constexpr int kMiddle = 1200;
+    if (number++ >= kMiddle) sample.gyro.x() += 0.2;
+  };
+  const auto root = tests::makeTurningDrive("motion_bias", drive);
+  const auto found = checkMotion(replay::Dataset::open({.path = root})->recording()).findings;
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found.front().code, "rig_changes");
+  EXPECT_NE(found.front().text.find("the bias of the gyroscope changes by 0.2"), std::string::npos)
+      << found.front().text;
+}
+
 }  // namespace
 }  // namespace perdure::calibrate
