@@ -8,6 +8,8 @@
 #include <optional>
 #include <vector>
 
+#include "common/base/errors.h"
+#include "common/base/files/access.h"
 #include "common/bus/discovery.h"
 #include "common/bus/topics.h"
 #include "common/service/on_demand.h"
@@ -245,6 +247,12 @@ web::Content contentFor(const service::Context& context, const gateway::Config& 
   if (!config.cameras.empty()) {
     files.replaceIn("/foxglove_layout.json", "/camera/cam0/",
                     "/camera/" + config.cameras.front() + "/");
+  }
+  if (const auto& truth = config.page_truth; !truth.empty()) {
+    if (textOf(truth).empty()) {
+      throw StartupError(ExitCode::kUnavailable, "page.truth: {} cannot be read", truth);
+    }
+    files.replaceIn("/truth.json", "null", textOf(truth));
   }
   return {"perdure", toHex(context.instance()), std::move(channels), gateway::serviceTable(),
           std::move(files)};

@@ -10,12 +10,14 @@ import { Past } from './past.js';
 import { PlaybackBar } from './playback.js';
 import { renderPlots } from './plots.js';
 import { TimeLine } from './timeline.js';
+import { Truth, wordsOfError } from './truth.js';
 import { MARKS, escaped, lookOfLoop, wordsOfImage, wordsOfNoImage, wordsOfPlace, wordsOfTime } from './words.js';
 import { World } from './world.js';
 
 const $ = (id) => document.getElementById(id);
 const model = new Model();
 const status = { state: 'connecting', sentence: '' };
+const truth = await Truth.load(); // null, but for simulated drives
 
 function addressOfGateway() {
   const address = new URL(location.href);
@@ -208,6 +210,7 @@ const toggles = {
     for (const item of document.querySelectorAll('#legend [data-seen]')) item.hidden = !on;
     return on;
   },
+  u: () => truth?.toggle(model, world),
   c: () => {
     showsCamera = !showsCamera;
     $('camera').hidden = !showsCamera;
@@ -285,6 +288,7 @@ function figures(now) {
   const stands = connection.range && connection.playback?.status !== 'playing';
   if (frame) items.push(['time', wordsOfTime(model.time, model.origin), ''], ['objects', [...model.objects.values()].filter((o) => o.confirmed).length, '']);
   const map = model.mapFrame;
+  if (frame && model.truth) items.push(['error', wordsOfError(truth.errorsOfBody(model.drive.slice(-1))), 'minor']);
   if (frame && map) items.push(['sessions', map.sessions, 'minor'], ['loops', map.loops, 'minor'], ['σ in map', wordsOfPlace(map.body_sigma), 'minor']);
   if (frame) items.push(['rate', stands ? '–' : `${model.rate(now).toFixed(0)} Hz`, 'minor'], ['latency', frame.latency_ms >= 0 && model.silentFor(now) < 2 ? `${frame.latency_ms.toFixed(0)} ms` : '–', 'minor']);
   return items.map(([k, v, c]) => `<div class="${c}"><dt>${k}</dt><dd>${v}</dd></div>`).join('');
@@ -327,6 +331,7 @@ function refresh() {
     if (!document.querySelector('[data-panel=objects]').hidden) list.render();
     if (!document.querySelector('[data-panel=object]').hidden && (model.chosen || panel.part)) panel.part ? panel.renderPart() : panel.render();
     grant();
+    model.truth?.show(model, world);
     if (!document.querySelector('[data-panel=plots]').hidden) renderPlots($('plots'), model);
     showState();
     link.write();
@@ -344,7 +349,7 @@ function now4(rate) {
 }
 
 // The state of the page in its address. `wished` has what waits for data: an object, a time.
-const LAYERS = ['f', 'e', 'l', 'm', 'g', 's', 'c', 'b', 'r'];
+const LAYERS = ['f', 'e', 'l', 'm', 'g', 's', 'u', 'c', 'b', 'r'];
 const isOn = (key) => document.querySelector(`[data-key=${key}]`).getAttribute('aria-pressed') === 'true';
 if (matchMedia('(max-width: 760px)').matches) toggle('r');
 const listed = () => [...$('events-filter').children].filter((b) => b.getAttribute('aria-pressed') === 'true').map((b) => b.dataset.group).join();

@@ -1,6 +1,7 @@
 // Shows all data of one object. While open, requests them from the gateway twice a second.
 import { Corrections } from './corrections.js';
 import { chart } from './plots.js';
+import { wordsOfError } from './truth.js';
 import { classWords, colourOf, escaped, existenceWords, isHidden, isInSight, percent, visibilityWords } from './words.js';
 
 const EVERY_MS = 500;
@@ -194,6 +195,7 @@ export class ObjectPanel {
       ['length', pm(o.size[0], o.size_sigma?.[0], 'm')], ['width', pm(o.size[1], o.size_sigma?.[1], 'm')], ['height', pm(o.size[2], o.size_sigma?.[2], 'm')],
       ['seen', `${o.hits ?? '?'} times, first ${this.ago(o.first_s)}, last ${this.ago(o.last_s)}`],
     ];
+    if (this.model.truth) rows.push(['error', wordsOfError(this.model.truth.errorsOf(o, this.model))]);
     if ((o.moving ?? 0) > 0.01) rows.push(['moves', `${percent(o.moving)}, ${Math.hypot(...o.velocity).toFixed(1)} m/s`]);
     const frame = this.model.objects.has(o.id) ? 'odom' : 'map';
     return `<h3>Where it is in ${frame}, and how large</h3><p class="dim">± one standard deviation</p><table>${rows.map(([k, v]) => `<tr><td class="dim">${k}</td><td>${v}</td></tr>`).join('')}</table>`;
