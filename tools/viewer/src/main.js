@@ -1,7 +1,7 @@
 // Assembles the page. Messages update the model, and the model updates map, lists and panels.
 import { CameraView } from './camera.js';
 import { Connection } from './connection.js';
-import { EventLog, ObjectList, renderServices } from './lists.js';
+import { EventLog, ObjectList, questionOf, renderServices } from './lists.js';
 import { wordsOfPart } from './graph_panel.js';
 import { Model, timeOf, troubleOf } from './model.js';
 import { Link } from './link.js';
@@ -40,9 +40,9 @@ try {
 const past = new Past();
 const camera = new CameraView($('camera'), $('image'), $('image-caption'), choose, (time, image) => { if (!connection.range) past.take('image', time, image); });
 const list = new ObjectList($('list').tBodies[0], $('list-note'), $('search'), model, choose);
-const log = new EventLog($('events'), $('events-filter'), model, choose, (at) => world?.lookAtPlace(at));
+const log = new EventLog($('events'), $('events-filter'), model, chooseLinked, (at) => world?.lookAtPlace(at));
 connection.onStatus = (sentence) => log.say(sentence);
-const panel = new ObjectPanel($('object'), model, connection, choose);
+const panel = new ObjectPanel($('object'), model, connection, chooseLinked);
 
 const playback = new PlaybackBar($('playback'), connection, model, lookBack);
 const timeline = new TimeLine($('timeline'), model, connection, playback, (group) => log.hides(group), choose);
@@ -76,6 +76,15 @@ function choose(id, { reveal = true, open = true } = {}) {
     panel.ask();
   }
 }
+
+/** Returns the id of the object to which `id` belongs now: people or the map may have joined it to
+    another one. */
+async function presentId(id) {
+  if (model.find(id)) return id;
+  const { objects } = await connection.call('/map/query', { id }).catch(() => ({}));
+  return objects?.[0]?.id ?? id;
+}
+async function chooseLinked(id) { choose(await presentId(id)); }
 
 /** Selects an anchor or a loop of the map's graph: {kind, id}. */
 function choosePart(part) {
@@ -163,22 +172,9 @@ function setAnswer(objects, note) {
 }
 $('search').addEventListener('input', () => setAnswer());
 $('ask-map').addEventListener('click', () => (model.answer?.objects ? setAnswer() : askMap()));
-/** Parses a query: a number, "near 30" (m around the vehicle), "at 12 -40 30", or a class. */
-function questionOf(text) {
-  const words = text.toLowerCase().split(/\s+/).filter(Boolean), numbers = words.slice(1).map(Number);
-  if (words.length === 0) return {};
-  if (/^\d+$/.test(words[0])) return { id: Number(words[0]) };
-  if (numbers.every(Number.isFinite)) {
-    const body = model.bodyInM();
-    if (words[0] === 'near' && numbers.length < 2) return { near: body, radius: numbers[0] ?? 30 };
-    if (words[0] === 'at' && numbers.length >= 2) return { near: [numbers[0], numbers[1], body[2]], radius: numbers[2] ?? 30 };
-  }
-  return { class: words.join(' ') };
-}
-
 async function askMap() {
   const word = $('search').value.trim();
-  const request = questionOf(word);
+  const request = questionOf(word, model);
   $('list-note').textContent = 'Waiting for the map …';
   try {
     const reply = await connection.call('/map/query', request);
@@ -389,8 +385,11 @@ function grant() {
     playback.seek(range.first + Number(wished.t), false);
     wished.t = undefined;
   }
-  if (wished.object && model.find(wished.object)) {
-    choose(wished.object, { open: false });
+  if (!wished.object) return;
+  if (model.find(wished.object)) choose(wished.object, { open: false });
+  else if (wished.asked !== wished.object && model.mapFrame) {
+    const asked = (wished.asked = wished.object);
+    presentId(asked).then((id) => { if (wished.object === asked) wished.object = id; });
   }
 }
 link.open();

@@ -11,6 +11,7 @@ export class ObjectPanel {
     this.element = element;
     this.model = model;
     this.connection = connection;
+    this.onLink = onLink;
     this.id = 0;
     this.part = this.told = null;
     this.corrections = new Corrections(connection);
@@ -63,6 +64,7 @@ export class ObjectPanel {
     try {
       const full = await this.connection.call('/object', { id });
       if (id !== this.id) return;
+      if (full.object && full.object.id !== id) return this.onLink(full.object.id); // it was joined to another one
       this.note = full.found === false ? 'It is neither in the working set nor on the map any more.' : '';
       if (full.found !== false) this.full = full;
       this.latency ??= performance.now() - this.shown;
@@ -86,7 +88,6 @@ export class ObjectPanel {
     const top = this.element.scrollTop;
     this.element.firstChild.innerHTML = this.heading(o) + this.whereWords(o) + this.existenceChart(o) + this.classes() + this.ledger() + this.margins() + this.place(o) + this.covariance();
     this.element.scrollTop = top;
-    this.element.dataset.object = String(this.id);
   }
 
   heading(o) {

@@ -410,6 +410,25 @@ check(await page.evaluate(async () => {
   return hides && none === null && hidden;
 }), 'without truth there is no switch');
 
+// An id that was joined to another object selects that object: by a link, the address, and when it is joined.
+const joined = await page.evaluate(async () => {
+  const { connection, model, choose } = window.perdure, call = connection.call.bind(connection), wait = (ms) => new Promise((r) => setTimeout(r, ms));
+  connection.call = (name, request) => (request.id !== 99 ? call(name, request) : Promise.resolve(name === '/object' ? { object: model.objects.get(2) } : { objects: [{ id: 2 }] }));
+  const chosen = [];
+  for (const way of [
+    () => { document.getElementById('events').insertAdjacentHTML('beforeend', '<li data-object="99">car 99</li>'); document.querySelector('[data-object="99"]').click(); },
+    () => { history.replaceState(null, '', '#object=99'); dispatchEvent(new HashChangeEvent('hashchange')); },
+    () => { document.querySelector('[data-tab=object]').click(); choose(99); }]) {
+    choose(0);
+    way();
+    for (let i = 0; i < 100 && model.chosen !== 2; ++i) await wait(100);
+    chosen.push(model.chosen);
+  }
+  connection.call = call;
+  return chosen;
+});
+check(String(joined) === '2,2,2', `ids that were joined to another object (${joined})`);
+
 // The time line: a row for each object, marks of events by the filter, and earlier times of live data.
 await page.keyboard.press('1');
 const rows = await page.evaluate(() => [...document.querySelectorAll('#rows button')].map((r) => r.getAttribute('aria-label')).sort().join());
