@@ -286,7 +286,7 @@ void serve(service::Context& context, const gateway::Config& config, const std::
                             mail.calls.push_back(std::move(call));
                             context.loop().wake();
                           }});
-  gateway::mcp::Worker worker(context.participant(),
+  gateway::mcp::Worker worker(context.participant(), !config.web.token.empty(),
                               [&](std::uint64_t number, const gateway::mcp::Answer& answer) {
                                 server.reply(number, answer.status, answer.text);
                               });

@@ -164,12 +164,15 @@ class Drive {
 };
 
 /// Answers queries by id, class, place and for all objects about the first two cars of the drive.
+/// Takes corrections of them.
 class MapStore {
  public:
   explicit MapStore(const bus::Participant& participant)
       : replies_(participant, bus::kTopic<MapReply>),
         queries_(participant, bus::kTopic<MapQuery>),
+        corrections_(participant, bus::kTopic<MapCorrection>),
         loop_(participant) {
+    loop_.on(corrections_, [this](const MapCorrection& request) { correct(request); });
     loop_.on(queries_, [this](const MapQuery& query) { answer(query); });
     thread_ = std::thread([this] { loop_.run(); });
   }
@@ -190,14 +193,33 @@ class MapStore {
       if (query.kind == MapQueryKind::kById && query.object_id != id) continue;
       ObjectBelief car = objectAt(id, {10.0 * static_cast<double>(id), 3.0, 0});
       car.seen_from[8] = 20.0F;
+      perdure::correct(standing_, car);
       reply.objects.push_back(test::rowOf(car));
       if (query.kind == MapQueryKind::kById) reply.beliefs.push_back(car);
     }
     (void)replies_.write(reply);
   }
 
+  void correct(const MapCorrection& request) {
+    MapReply reply;
+    reply.client = request.client;
+    reply.request = request.request;
+    Correction made = request.correction;
+    if (made.withdrawn) {
+      made.object = standing_.begin()->first;
+      standing_.clear();
+    } else {
+      made.id = 4;
+      standing_ = {{made.object, {made}}};
+    }
+    reply.corrections = {made};
+    (void)replies_.write(reply);
+  }
+
+  CorrectionsOf standing_;
   bus::Writer<MapReply> replies_;
   bus::Reader<MapQuery> queries_;
+  bus::Reader<MapCorrection> corrections_;
   bus::WaitLoop loop_;
   std::thread thread_;
 };
@@ -288,6 +310,22 @@ TEST_F(Strangers, TheSdkOfTheModelContextProtocolAsksTheMap) {
       EXPECT_EQ(said["results"]["find_objects"]["items"], 2);
       EXPECT_EQ(status_, 0);
     }
+  }
+}
+
+TEST_F(Strangers, TheSdkOfTheModelContextProtocolCorrectsTheMapWhereThatIsAllowed) {
+  start({"http.token=s3cret"});
+  const Drive drive(participant_);
+  const MapStore store(participant_);
+  const std::string url = "http://127.0.0.1:" + port_ + "/mcp";
+  const std::string perdure = (programs() / "perdure").string();
+  for (const auto& transport : {std::vector<std::string>{"http", url, "s3cret", ""},
+                                {"stdio", "", perdure, "mcp", "--allow-corrections"}}) {
+    const json said = answerOf("mcp.mjs", transport);
+    ASSERT_TRUE(said.is_object()) << contentsOf(folder_.file("mcp.mjs")) << gateway_->log();
+    EXPECT_THAT(said["problems"], IsEmpty()) << said.dump(1);
+    EXPECT_EQ(said["tools"].size(), 6u);
+    EXPECT_EQ(said["results"]["correct"]["correction"]["withdrawn"], true);
   }
 }
 
