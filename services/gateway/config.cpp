@@ -31,6 +31,8 @@ void describe(Config& c, config::Fields& fields) {
   fields.text(
       "page.folder", c.page_folder,
       {"folder of the built page; empty: share/perdure/viewer beside the program's folder"});
+  fields.text("page.truth", c.page_truth,
+              {"truth of a simulated drive, as the demo writes it"});
   fields.texts("image.cameras", c.cameras, {"cameras whose images are sent"});
   fields.number("image.rate", c.image_rate_hz, config::between(0.1, 60.0),
                 {"highest rate of images", "Hz"});

@@ -12,7 +12,7 @@ namespace perdure::gateway {
 
 struct Config {
   web::Options web;
-  std::string page_folder;
+  std::string page_folder, page_truth;
   std::vector<std::string> cameras = {"cam0"};
   double image_rate_hz = 10.0;
   std::int64_t image_quality = 70;

@@ -8,6 +8,8 @@
 #include <optional>
 #include <vector>
 
+#include "common/base/errors.h"
+#include "common/base/files/access.h"
 #include "common/bus/discovery.h"
 #include "common/bus/topics.h"
 #include "common/service/on_demand.h"
@@ -246,6 +248,12 @@ web::Content contentFor(const service::Context& context, const gateway::Config& 
     files.replaceIn("/foxglove_layout.json", "/camera/cam0/",
                     "/camera/" + config.cameras.front() + "/");
   }
+  if (const auto& truth = config.page_truth; !truth.empty()) {
+    if (textOf(truth).empty()) {
+      throw StartupError(ExitCode::kUnavailable, "page.truth: {} cannot be read", truth);
+    }
+    files.replaceIn("/truth.json", "null", textOf(truth));
+  }
   return {"perdure", toHex(context.instance()), std::move(channels), gateway::serviceTable(),
           std::move(files)};
 }
@@ -278,7 +286,7 @@ void serve(service::Context& context, const gateway::Config& config, const std::
                             mail.calls.push_back(std::move(call));
                             context.loop().wake();
                           }});
-  gateway::mcp::Worker worker(context.participant(),
+  gateway::mcp::Worker worker(context.participant(), !config.web.token.empty(),
                               [&](std::uint64_t number, const gateway::mcp::Answer& answer) {
                                 server.reply(number, answer.status, answer.text);
                               });

@@ -108,7 +108,7 @@ void Node::sendNow(std::uint32_t channel) {
       if (objects_) sendScene();
       return;
     case kObjects:
-      if (objects_) send(kObjects, objectsAtAGlance(*objects_, latency_ms_));
+      if (objects_) send(kObjects, objectsAtAGlance(*objects_, latency_ms_, bodySigma()));
       return;
     case kEvents:
     case kLog:
@@ -176,6 +176,12 @@ void Node::onOdometry(const Odometry& odometry, std::int64_t now_ns) {
   trajectory_.add(odometry.stamp.time, odometry.world, odometry.T_WB);
   if (wants(kMapSeen)) lookAtGround();
   if (pose_pace_.due(odometry.stamp.time)) sendPose(odometry.stamp.time);
+}
+
+/// Returns the standard deviation of the body's position in W, or -1 if unknown.
+double Node::bodySigma() const {
+  if (!odometry_ || odometry_->world != objects_->world) return -1;
+  return std::sqrt(odometry_->covariance.diagonal().segment<3>(3).sum());
 }
 
 /// Returns the height of the ground in W: the median underside of the confirmed objects.

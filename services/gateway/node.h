@@ -118,6 +118,7 @@ class Node {
   std::size_t sendMap();  ///< number of objects sent
   bool wantsGraph() const { return wants(kMapGraph) || wants(kMapGraphScene) || wants(kMapSeen); }
   double groundHeight() const;
+  double bodySigma() const;
   void lookAtGround();
   // Defined in node_calls.cpp.
   void lookAtGraph(bool looked_before);

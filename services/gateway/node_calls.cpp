@@ -1,9 +1,9 @@
 // Service calls of clients: the full state of one object, and queries of the map.
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "common/types/correction_json.h"
 #include "services/gateway/node.h"
 
 namespace perdure::gateway {
@@ -69,44 +69,6 @@ std::optional<MapQuery> queryOf(const Json& request) {
   return query;
 }
 
-std::string textOf(const Json& request, const char* name) {
-  const auto found = request.find(name);
-  return found != request.end() && found->is_string() ? found->get<std::string>() : std::string();
-}
-
-/// Returns the correction of a request, or nothing if it has no valid one.
-std::optional<Correction> correctionOf(const Json& request) {
-  Correction correction;
-  correction.author = textOf(request, "author");
-  if (const auto id = idOf(request, "withdraw")) {
-    correction.id = *id;
-    correction.withdrawn = true;
-    return correction;
-  }
-  constexpr std::array kKinds{CorrectionKind::kNotThere, CorrectionKind::kClass,
-                              CorrectionKind::kSame, CorrectionKind::kDifferent};
-  const std::string name = textOf(request, "kind");
-  const auto kind = std::ranges::find(kKinds, name, [](auto k) { return std::string(nameOf(k)); });
-  const auto object = idOf(request, "object");
-  if (kind == kKinds.end() || !object) return std::nullopt;
-  correction.kind = *kind;
-  correction.object = *object;
-  correction.other = idOf(request, "other").value_or(0);
-  correction.class_name = textOf(request, "class");
-  const auto nats = numberOf(request, "nats");
-  if (nats && !(*nats > 0.0 && *nats <= kMostCorrectionNats)) return std::nullopt;
-  correction.nats = nats.value_or(0.0);  // 0: the map's default
-  if (correction.aboutTwo() && correction.other == 0) return std::nullopt;
-  if (correction.kind == CorrectionKind::kClass && correction.class_name.empty()) {
-    return std::nullopt;
-  }
-  constexpr std::size_t kMostText = 256;  // bytes on the bus
-  for (const std::string* text : {&correction.author, &correction.class_name}) {
-    if (text->size() > kMostText) return std::nullopt;
-  }
-  return correction;
-}
-
 }  // namespace
 
 void Node::fail(const Call& call, const std::string& sentence) {
@@ -169,13 +131,8 @@ void Node::askForCorrection(const Call& call, std::int64_t now_ns) {
                 "?token=…");
   }
   const Json request = Json::parse(call.payload, nullptr, false);
-  const auto correction = request.is_object() ? correctionOf(request) : std::nullopt;
-  if (!correction) {
-    return fail(call,
-                "correct as {\"object\": 12, \"kind\": \"not_there\"}, {\"object\": 12, \"kind\": "
-                "\"class\", \"class\": \"car\"}, {\"object\": 12, \"kind\": \"same\" or "
-                "\"different\", \"other\": 15}, or {\"withdraw\": 3}");
-  }
+  const auto correction = correctionOf(request);
+  if (!correction) return fail(call, std::string("correct as ") + kCorrectionForms);
   ask(call, MapCorrection{0, 0, *correction}, outputs_.correction, now_ns);
 }
 

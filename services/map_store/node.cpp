@@ -263,7 +263,11 @@ MapReply Node::answer(const MapQuery& query) {
   MapReply reply = emptyReply(query.client, query.request);
   reply.error = faultOf(query);
   if (reply.error.empty()) {
-    auto found = find(query);
+    MapQuery present = query;  // asks for the object of a track that was joined to another one
+    if (query.kind == MapQueryKind::kById) {
+      present.object_id = mapper_.identity().objectOf(query.object_id);
+    }
+    auto found = find(present);
     if (found) {
       if (found->malformed > 0) reasons_.add("belief_malformed", found->malformed);
       reply.truncated = found->truncated;

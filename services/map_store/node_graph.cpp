@@ -52,9 +52,15 @@ void Node::loadGraph() {
 void Node::loadFacts() {
   auto facts = database_.reader().facts();
   if (!facts) return blame(facts.error());
+  auto corrections = database_.reader().corrections();
+  if (!corrections) {
+    reasons_.add(corrections.error());
+    notice_ += "The corrections cannot be read (" + corrections.error().detail +
+               "), so they have no effect; restore a copy of the file.";
+  }
   mapping::SavedMap map;
   map.facts = *std::move(facts);
-  map.corrections = database_.reader().corrections().value_or(map.corrections);
+  if (corrections) map.corrections = *std::move(corrections);
   mapper_ = mapping::Mapper(config_.mapping, std::move(map));
 }
 

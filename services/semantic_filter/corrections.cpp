@@ -26,9 +26,10 @@ void Corrections::apply(Objects& objects) const {
   objects.as_estimated.clear();
   if (of_.empty()) return;
   for (ObjectBelief& belief : objects.objects) {
-    const ObjectId object = objectOf(belief.id);
-    if (!of_.contains(object)) continue;
+    const ObjectId object = objectOf(belief.id), by = objectOf(belief.blocked_by);
+    if (!of_.contains(object) && by == belief.blocked_by) continue;
     objects.as_estimated.push_back(belief);
+    belief.blocked_by = by;
     const TrackId track = belief.trackId();
     belief.track = track == object ? 0 : track;
     belief.id = object;
@@ -39,6 +40,22 @@ void Corrections::apply(Objects& objects) const {
   });
   const auto rest = std::ranges::unique(objects.objects, {}, &ObjectBelief::id);
   objects.objects.erase(rest.begin(), rest.end());
+}
+
+void Corrections::apply(std::vector<Event>& events, const Objects& objects) const {
+  const auto isLeftOut = [&](const Event& event) {
+    const ObjectId object = objectOf(event.object_id);
+    const auto shown = std::ranges::find(objects.objects, object, &ObjectBelief::id);
+    if (!joined_.contains(event.object_id) || shown == objects.objects.end()) return false;
+    const auto own = std::ranges::find(objects.as_estimated, shown->trackId(),
+                                       [](const ObjectBelief& each) { return each.trackId(); });
+    return own != objects.as_estimated.end() && own->id != event.object_id;
+  };
+  std::erase_if(events, isLeftOut);
+  for (Event& event : events) {
+    event.object_id = objectOf(event.object_id);
+    event.other_id = objectOf(event.other_id);
+  }
 }
 
 }  // namespace perdure::semantic_filter

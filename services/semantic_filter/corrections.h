@@ -16,6 +16,9 @@ class Corrections {
   /// Corrects the objects, which are sorted by id, and copies their own beliefs to `as_estimated`.
   /// Of several tracks that people joined, the one detected last remains.
   void apply(Objects& objects) const;
+  /// Gives events the ids of the objects that apply() returned. Leaves out events about tracks that
+  /// it left out.
+  void apply(std::vector<Event>& events, const Objects& objects) const;
 
  private:
   ObjectId objectOf(ObjectId id) const;

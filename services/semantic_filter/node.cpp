@@ -263,6 +263,7 @@ void Node::publish(const Frame& frame) {
   }
   events.insert(events.end(), returns.begin(), returns.end());
   corrections_.apply(objects);
+  corrections_.apply(events, objects);
   if (outputs_.objects) outputs_.objects(objects);
   for (const auto& event : events) {
     if (outputs_.events) outputs_.events(event);

@@ -11,6 +11,7 @@
 #include "common/base/errors.h"
 #include "common/config/fields.h"
 #include "services/semantic_filter/priors.h"
+#include "tools/demo/truth.h"
 #include "tools/evaluate/simulated_truth.h"
 
 namespace perdure::tools {
@@ -140,7 +141,12 @@ std::vector<ServicePlan> planServices(const DemoOptions& options, const DemoFold
 std::optional<ServicePlan> planGateway(const DemoOptions& options, const DemoFolders& folders,
                                        std::uint16_t port) {
   if (!fs::exists(fs::absolute(options.programs) / programName(kGateway))) return std::nullopt;
-  return planOf(kGateway, options, folders, {fmt::format("http.port={}", port)});
+  std::vector<std::string> settings = {fmt::format("http.port={}", port)};
+  if (isSimulated(options.data)) {
+    const fs::path truth = folders.run / "truth.json";
+    if (writeTruthForPage(options.data, truth)) settings.push_back("page.truth=" + truth.string());
+  }
+  return planOf(kGateway, options, folders, settings);
 }
 
 std::uint16_t freePort() {

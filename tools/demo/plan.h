@@ -60,7 +60,8 @@ std::map<std::string, std::vector<Eigen::Vector3d>> shapesFor(const DemoOptions&
 /// --rate is invalid.
 std::vector<ServicePlan> planServices(const DemoOptions& options, const DemoFolders& folders);
 
-/// Plans perdure-gateway on this port of the loopback interface; empty if it is not installed.
+/// Plans perdure-gateway on this port of the loopback interface; empty if it is not installed. For
+/// a simulated drive, writes RUN/truth.json, which the page shows.
 std::optional<ServicePlan> planGateway(const DemoOptions& options, const DemoFolders& folders,
                                        std::uint16_t port);
 /// Returns port 8765 if it is free, else any free port.

@@ -2,16 +2,19 @@
 
 #include <algorithm>
 #include <array>
+#include <fstream>
 #include <limits>
 #include <vector>
 
 #include "common/base/algorithms/median.h"
 #include "common/base/errors.h"
+#include "common/replay/dataset.h"
 #include "common/replay/files/kitti_calibration.h"
 #include "common/replay/files/kitti_labels.h"
 #include "common/replay/files/pose_file.h"
 #include "tools/evaluate/object_report.h"
 #include "tools/evaluate/object_score.h"
+#include "tools/evaluate/simulated_truth.h"
 
 namespace perdure::tools {
 namespace {
@@ -72,6 +75,21 @@ Json parkedCars(const std::vector<replay::KittiLabel>& labels, const std::set<st
   return cars;
 }
 
+Json toJson(const sim::TruthObject& object) {
+  Json keys = Json::array();
+  for (const sim::TruthKey& key : object.keys) {
+    const Eigen::Vector3d& p = key.centre_W;
+    keys.push_back({toSeconds(key.time), p.x(), p.y(), p.z(), key.yaw});
+  }
+  return {{"id", object.id},
+          {"class", object.class_name},
+          {"size", {object.size.x(), object.size.y(), object.size.z()}},
+          {"from", toSeconds(object.present_from)},
+          {"until", toSeconds(object.present_until)},
+          {"moves", object.moves},
+          {"keys", keys}};
+}
+
 }  // namespace
 
 std::optional<TruthFiles> findTruth(const DemoOptions& options) {
@@ -119,6 +137,24 @@ Json scoreAgainst(const TruthFiles& truth, const fs::path& out) {
       "the map for each true one that was found";
   report["parked_cars"] = parkedCars(labels, tracks, poses, calibration.T_RI, rows);
   return report;
+}
+
+bool writeTruthForPage(const fs::path& drive, const fs::path& file) {
+  const auto dataset = replay::Dataset::open({.path = drive, .decode = false});
+  if (!lackOfTruth(drive, *dataset).empty()) return false;
+  Json truth = {{"path", Json::array()}, {"objects", Json::array()}};
+  for (std::uint64_t i = 0; i < dataset->frameCount(); ++i) {
+    const auto time = dataset->frameTime(i);
+    const auto body = time ? dataset->truth()->at(i, *time) : std::nullopt;
+    if (!body) continue;
+    const auto& [q, p] = std::pair(body->q, body->p);
+    truth["path"].push_back({toSeconds(*time), p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()});
+  }
+  for (const auto& object : sim::readTruth(drive).objects) {
+    truth["objects"].push_back(toJson(object));
+  }
+  std::ofstream(file) << truth;
+  return true;
 }
 
 }  // namespace perdure::tools

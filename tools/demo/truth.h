@@ -24,4 +24,8 @@ std::optional<TruthFiles> findTruth(const DemoOptions& options);
 /// duplicates, position error (final estimates, matches within 1 m), and each parked car.
 nlohmann::ordered_json scoreAgainst(const TruthFiles& truth, const std::filesystem::path& out);
 
+/// Writes the true path and the true objects of a simulated drive, in the world's frame. Returns
+/// false, without a file, if the drive lacks a part of the truth.
+bool writeTruthForPage(const std::filesystem::path& drive, const std::filesystem::path& file);
+
 }  // namespace perdure::tools

@@ -120,6 +120,10 @@ std::string lineOf(const FusedFile& file) {
         "is left out",
         namesOf(report.parted));
   }
+  if (report.corrections_left_out > 0) {
+    line += fmt::format("; {} corrections are left out, because a map has at most {}",
+                        report.corrections_left_out, kMostCorrections);
+  }
   return line + "\n";
 }
 
@@ -162,7 +166,7 @@ Json toJson(const FusedFile& file) {
           {"longer", toJson(r.grown)}, {"parted", toJson(r.parted)},
           {"known", r.known},          {"new_objects", r.objects},
           {"seen_again", r.renewed},   {"loops", r.loops},
-          {"merges", r.merges}};
+          {"merges", r.merges},        {"corrections_left_out", r.corrections_left_out}};
 }
 
 Json toJson(const mapping::Change& change) {

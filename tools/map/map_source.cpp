@@ -29,11 +29,11 @@ map_store::Connection openAtOneState(const std::string& path) {
 MapFile::MapFile(std::string path)
     : path_(std::move(path)),
       connection_(openAtOneState(path_)),
-      working_(reader_.working().value_or(std::nullopt)) {
+      working_(read(path_, reader_.working())) {
   const auto corrections = read(path_, reader_.corrections());
   if (corrections.empty()) return;
-  const mapping::Identity identity(saved().facts, corrections);
-  corrections_ = standingByObject(corrections, [&](ObjectId id) { return identity.objectOf(id); });
+  identity_ = mapping::Identity(saved().facts, corrections);
+  corrections_ = standingByObject(corrections, [&](ObjectId id) { return identity_.objectOf(id); });
 }
 
 const mapping::SavedMap& MapFile::saved() const {
@@ -56,7 +56,8 @@ const map_store::MapInM& MapFile::inM() {
   return *view_;
 }
 
-MapReply MapFile::ask(const MapQuery& query, MapFrameChoice frame) {
+MapReply MapFile::ask(MapQuery query, MapFrameChoice frame) {
+  if (query.kind == MapQueryKind::kById) query.object_id = identity_.objectOf(query.object_id);
   const WorldId newest = working_.value_or(Objects{}).world;
   const bool as_stored = frame == MapFrameChoice::kW || query.world.world != 0;
   auto found = read(path_, as_stored ? reader_.find(query, newest, query.limit)

@@ -27,7 +27,7 @@ class MapFile {
 
   /// Answers a query. Spatial queries search query.world; if it is 0, they search the M or W of the
   /// newest session. If it is not 0, objects are in W.
-  MapReply ask(const MapQuery& query, MapFrameChoice frame = MapFrameChoice::kM);
+  MapReply ask(MapQuery query, MapFrameChoice frame = MapFrameChoice::kM);
   /// Returns the graph as a running map_store would.
   MapReply graph(const MapQuery& query) const;
   /// Returns the position of M's origin on Earth, and the yaw of M. Returns nothing if the file has
@@ -49,6 +49,7 @@ class MapFile {
 
   std::string path_;
   map_store::Connection connection_;
+  mapping::Identity identity_;  ///< only if there are corrections
   CorrectionsOf corrections_;
   map_store::MapReader reader_{&connection_, &corrections_};
   std::optional<Objects> working_;                  ///< the last stored working set

@@ -25,6 +25,7 @@ constexpr std::size_t kLongestLine = 1 << 20;
 struct Request {
   bus::Options bus;
   std::string map;
+  bool allow_corrections = false;
 };
 
 /// Appends bytes of standard input. Calls `idle` each second until some arrive. Returns false at
@@ -67,12 +68,12 @@ void serve(mcp::Map& map, const std::function<void()>& idle) {
 
 void run(const Request& request) {
   if (!request.map.empty()) {
-    FileMap map(request.map);
+    FileMap map(request.map, request.allow_corrections);
     return serve(map, [] {});
   }
   const bus::Domain domain(request.bus);
   const bus::Participant participant(domain, "perdure mcp");
-  mcp::BusMap map(participant);
+  mcp::BusMap map(participant, request.allow_corrections);
   serve(map, [&] { map.follow(); });
 }
 
@@ -84,6 +85,8 @@ void setUpMcp(CLI::App& command) {
       .add_option("--map", request->map,
                   "a map's file or its folder; without it, the running services are asked")
       ->type_name("PATH");
+  command.add_flag("--allow-corrections", request->allow_corrections,
+                   "the client may correct the map, and withdraw corrections");
   addBusOptions(command, request->bus);
   command.callback([request] { run(*request); });
 }

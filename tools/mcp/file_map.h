@@ -6,6 +6,7 @@
 #include <string>
 
 #include "services/gateway/mcp/map.h"
+#include "tools/map/correct_file.h"
 #include "tools/map/map_source.h"
 
 namespace perdure::tools {
@@ -13,8 +14,9 @@ namespace perdure::tools {
 class FileMap : public gateway::mcp::Map {
  public:
   /// `path`: a map's file, or a folder with map.sqlite. Throws StartupError if it is not readable.
-  explicit FileMap(const std::string& path)
-      : path_(std::filesystem::is_directory(path) ? path + "/map.sqlite" : path) {
+  explicit FileMap(const std::string& path, bool takes_corrections = false)
+      : takes_corrections_(takes_corrections),
+        path_(std::filesystem::is_directory(path) ? path + "/map.sqlite" : path) {
     file_.emplace(path_);
   }
 
@@ -30,8 +32,17 @@ class FileMap : public gateway::mcp::Map {
   MapReply ask(const MapQuery& query) override {
     return query.kind == MapQueryKind::kGraph ? file_->graph(query) : file_->ask(query);
   }
+  bool takesCorrections() const override { return takes_corrections_; }
+  Correction correct(const Correction& correction) override {
+    file_.reset();  // the file is written alone
+    const MapReply reply = correctFile(path_, correction);
+    file_.emplace(path_);
+    if (!reply.ok) throw gateway::mcp::NoAnswer(reply.error);
+    return reply.corrections.at(0);
+  }
 
  private:
+  const bool takes_corrections_;
   std::string path_;
   std::optional<MapFile> file_;
 };

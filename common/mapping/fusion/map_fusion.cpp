@@ -112,6 +112,7 @@ FusionReport fuseInto(MapContents& map, const MapContents& other, const Paramete
   report.parted = addition.parted;
   report.known = addition.known;
   report.renewed = addition.renewed.size();
+  report.corrections_left_out = addition.corrections_left_out;
   for (const ObjectId id : addition.objects) report.objects += map.objects.at(id).ended ? 0 : 1;
   report.changes = renew(map, addition);
   const auto sessions = toBeReplayed(map, addition);

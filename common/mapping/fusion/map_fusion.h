@@ -15,15 +15,16 @@ namespace perdure::mapping {
 
 /// The result of adding one map.
 struct FusionReport {
-  std::vector<WorldId> added, grown;  ///< sessions, by their worlds in the fused map
-  std::vector<WorldId> parted;        ///< continued differently in two maps; one continuation is
-                                      ///< used
-  std::size_t known = 0;              ///< sessions with nothing new
-  std::size_t objects = 0;            ///< objects added, without history
-  std::size_t renewed = 0;            ///< known objects with later observations
-  std::size_t loops = 0;              ///< loop closures between new and earlier sessions
-  std::size_t merges = 0;             ///< added objects that were identified with known ones
-  std::vector<Change> changes;        ///< new changes
+  std::vector<WorldId> added, grown;     ///< sessions, by their worlds in the fused map
+  std::vector<WorldId> parted;           ///< continued differently in two maps; one continuation is
+                                         ///< used
+  std::size_t known = 0;                 ///< sessions with nothing new
+  std::size_t objects = 0;               ///< objects added, without history
+  std::size_t renewed = 0;               ///< known objects with later observations
+  std::size_t loops = 0;                 ///< loop closures between new and earlier sessions
+  std::size_t merges = 0;                ///< added objects that were identified with known ones
+  std::size_t corrections_left_out = 0;  ///< beyond kMostCorrections
+  std::vector<Change> changes;           ///< new changes
 };
 
 /// Adds `other` to `map`; both must have at least one session. The order in which the others are

@@ -152,7 +152,7 @@ class Uniting {
   }
 
   /// Adds the corrections, with new ids. A correction that both maps have stays withdrawn if one of
-  /// them withdrew it.
+  /// them withdrew it. Standing ones beyond kMostCorrections are left out.
   void addCorrections() {
     std::vector<Correction>& ours = map_.graph.corrections;
     const auto ofOurs = [&](ObjectId theirs) {
@@ -172,6 +172,11 @@ class Uniting {
       });
       if (known != ours.end()) {
         known->withdrawn = known->withdrawn || each.withdrawn;
+        continue;
+      }
+      const auto standing = std::ranges::count(ours, false, &Correction::withdrawn);
+      if (!each.withdrawn && std::cmp_greater_equal(standing, kMostCorrections)) {
+        ++addition_.corrections_left_out;
         continue;
       }
       each.id = ours.empty() ? 1 : ours.back().id + 1;

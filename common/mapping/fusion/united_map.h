@@ -27,6 +27,7 @@ struct Addition {
                                   ///< out
   std::set<ObjectId> objects;     ///< new objects
   std::vector<Renewed> renewed;   ///< known objects that were observed again, or that ended
+  std::size_t corrections_left_out = 0;  ///< beyond kMostCorrections standing ones
 };
 
 /// Adds `other` to `map`. Beliefs of renewed objects do not change here, because their fusion

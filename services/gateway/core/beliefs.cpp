@@ -148,14 +148,15 @@ std::string sentenceOf(const Event& e) {
 
 }  // namespace
 
-std::string objectsAtAGlance(const Objects& objects, double latency_ms) {
+std::string objectsAtAGlance(const Objects& objects, double latency_ms, double body_sigma) {
   JsonWriter json(1024 + 640 * objects.objects.size());
   json.begin('{').with("timestamp", objects.stamp.time).with("frame_id", kOdomFrame);
   json.with("world", toHex(objects.world.world)).with("epoch", objects.world.epoch);
   json.with("sequence", objects.stamp.sequence).with("latency_ms", latency_ms, 1);
   const RigidTransform& T = objects.T_WB;
   const std::array<double, 7> body{T.p.x(), T.p.y(), T.p.z(), T.q.x(), T.q.y(), T.q.z(), T.q.w()};
-  json.with("body", body, 5).with("up", {objects.up_W.data(), 3}, 5).key("objects").begin('[');
+  json.with("body", body, 5).with("body_sigma", body_sigma, 4);
+  json.with("up", {objects.up_W.data(), 3}, 5).key("objects").begin('[');
   for (const ObjectBelief& object : objects.objects) putGlance(json, object);
   return json.end(']').end('}').take();
 }

@@ -13,8 +13,9 @@
 
 namespace perdure::gateway {
 
-/// Returns the message "perdure.Objects". A negative `latency_ms` is unknown.
-std::string objectsAtAGlance(const Objects& objects, double latency_ms);
+/// Returns the message "perdure.Objects". A negative `latency_ms`, and `body_sigma` (m, of the body
+/// in W), is unknown.
+std::string objectsAtAGlance(const Objects& objects, double latency_ms, double body_sigma = -1);
 /// Return an event as "perdure.Event", and its text as "foxglove.Log". `place`: position of the
 /// event in W.
 std::string eventJson(const Event& event, const std::optional<Eigen::Vector3d>& place = {});

@@ -113,6 +113,7 @@ perdure.Objects!
  epoch natural; sequence natural
  latency_ms number: from capture; below 0: not known
  body number[]: pose: x y z, quaternion x y z w
+ body_sigma number: of its position, m, root of the trace; below 0: not known
  up number[]: against gravity; yaws are about it
  objects object_summary[]
 class_belief

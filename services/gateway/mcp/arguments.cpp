@@ -26,13 +26,25 @@ const Json& knownArguments() {
       "description": "least match_probability"},
     "limit": {"type": "integer", "minimum": 1, "maximum": 50,
       "description": "at most so many results; 10 if not given"},
-    "id": {"type": "integer", "minimum": 1, "description": "id of an object"}})");
+    "id": {"type": "integer", "minimum": 1, "description": "id of an object"},
+    "object": {"type": "integer", "minimum": 1, "description": "id of an object"},
+    "kind": {"type": "string", "enum": ["not_there", "class", "same", "different"],
+      "description": "what is stated about the object"},
+    "other": {"type": "integer", "minimum": 1, "description": "the object that is the same or different"},
+    "nats": {"type": "number", "minimum": 0.01, "maximum": 50,
+      "description": "log-likelihood ratio of the statement; the map's default if not given"},
+    "author": {"type": "string", "maxLength": 256, "description": "the person who states it"},
+    "withdraw": {"type": "integer", "minimum": 1, "description": "number of a correction"}})");
   return known;
 }
 
 /// Whether a value meets its schema. Only the keywords of knownArguments() are known.
 bool isValid(const Json& value, const Json& schema) {
-  if (schema["type"] == "string") return value.is_string();
+  if (schema["type"] == "string") {
+    const Json choices = schema.value("enum", Json::array({value}));
+    return value.is_string() && std::ranges::find(choices, value) != choices.end() &&
+           value.get_ref<const std::string&>().size() <= schema.value("maxLength", SIZE_MAX);
+  }
   if (schema["type"] == "array") {
     return value.is_array() && value.size() >= schema["minItems"] &&
            value.size() <= schema["maxItems"] && std::ranges::all_of(value, [&](const Json& each) {

@@ -8,10 +8,21 @@ namespace {
 constexpr double kPatience_s = 3.0;
 constexpr std::size_t kMostEnded = 4096;
 
+MapReply answered(Result<MapReply> reply) {
+  if (!reply) {
+    throw NoAnswer(reply.error().code == "no_answer"
+                       ? "map_store does not answer; see perdure doctor"
+                       : "There is no map_store on this bus; start perdure-map-store.");
+  }
+  if (!reply->ok) throw NoAnswer(reply->error);
+  return *std::move(reply);
+}
+
 }  // namespace
 
-BusMap::BusMap(const bus::Participant& participant)
+BusMap::BusMap(const bus::Participant& participant, bool takes_corrections)
     : participant_(participant),
+      takes_corrections_(takes_corrections),
       client_(participant),
       events_(participant, bus::kTopic<Event>),
       calibrations_(participant, bus::kTopic<Calibration>) {}
@@ -60,15 +71,10 @@ State BusMap::begin() {
   return state;
 }
 
-MapReply BusMap::ask(const MapQuery& query) {
-  auto reply = client_.ask(query, kPatience_s);
-  if (!reply) {
-    throw NoAnswer(reply.error().code == "no_answer"
-                       ? "map_store does not answer; see perdure doctor"
-                       : "There is no map_store on this bus; start perdure-map-store.");
-  }
-  if (!reply->ok) throw NoAnswer(reply->error);
-  return *std::move(reply);
+MapReply BusMap::ask(const MapQuery& query) { return answered(client_.ask(query, kPatience_s)); }
+
+Correction BusMap::correct(const Correction& correction) {
+  return answered(client_.correct(correction, kPatience_s)).corrections.at(0);
 }
 
 }  // namespace perdure::gateway::mcp

@@ -38,6 +38,12 @@ class Map {
   virtual State begin() = 0;
   /// Answers in M. Both functions throw NoAnswer or StartupError.
   virtual MapReply ask(const MapQuery& query) = 0;
+  /// Whether clients may correct the map.
+  virtual bool takesCorrections() const { return false; }
+  /// Returns the correction as the map stores it. Throws as ask().
+  virtual Correction correct(const Correction& /*correction*/) {
+    throw NoAnswer("this map takes no corrections");
+  }
 };
 
 }  // namespace perdure::gateway::mcp

@@ -69,7 +69,7 @@ Json called(const Json& params, Map& map) {
 Json resultOf(const std::string& method, const Json& params, Map& map) {
   if (method == "initialize") return initialized(params);
   if (method == "ping") return Json::object();
-  if (method == "tools/list") return {{"tools", listTools()}};
+  if (method == "tools/list") return {{"tools", listTools(map)}};
   if (method == "tools/call") return called(params, map);
   throw RpcError{kMethodNotFound, "there is no method " + method};
 }

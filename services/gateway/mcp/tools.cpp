@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/types/correction_json.h"
 #include "common/types/ledger_json.h"
 #include "services/gateway/mcp/looked.h"
 #include "services/gateway/mcp/objects.h"
@@ -172,6 +173,18 @@ Json neverSeen(const Json& arguments, Map& map) {
   return answer;
 }
 
+Json correctMap(const Json& arguments, Map& map) {
+  auto correction = correctionOf(arguments);
+  if (!correction) throw NoAnswer(std::string("correct as ") + kCorrectionForms);
+  if (correction->author.empty()) correction->author = "assistant";
+  const Correction made = map.correct(*correction);
+  const State state = map.begin();
+  Json answer = answerOf(state);
+  answer["correction"] = perdure::toJson(made);
+  answer["object"] = presentOf(map, state, made.object).json;
+  return answer;
+}
+
 /// The schema of objects, changes and regions in answers.
 Json itemSchema() {
   return Json::parse(R"({"type": "object", "properties": {
@@ -197,6 +210,7 @@ struct Tool {
   Json input;
   const char* list;  ///< the member of the result with its items
   Json (*run)(const Json& arguments, Map& map);
+  bool writes = false;  ///< only for maps that take corrections
 };
 
 const std::vector<Tool>& tools() {
@@ -229,7 +243,13 @@ const std::vector<Tool>& tools() {
        "number of objects to expect there. Walls are not on the map: ground behind them may count "
        "as looked at.",
        schemaOfArguments({"near", "radius_m", "class", "text", "limit"}, {"near", "radius_m"}),
-       "regions", neverSeen}};
+       "regions", neverSeen},
+      {"correct",
+       "Corrects the map, if a person asks for it: an object is not there, has another class, or "
+       "two objects are the same or different. Or withdraws the correction with a number. `object` "
+       "has the evidence afterwards, with the entry `person`.",
+       schemaOfArguments({"object", "kind", "class", "other", "nats", "author", "withdraw"}, {}),
+       "object", correctMap, true}};
   return all;
 }
 
@@ -249,21 +269,22 @@ Json resultOf(const Tool& tool, const Json& arguments, Map& map) {
 
 }  // namespace
 
-Json listTools() {
+Json listTools(const Map& map) {
   Json list = Json::array();
   for (const Tool& tool : tools()) {
+    if (tool.writes && !map.takesCorrections()) continue;
     list.push_back({{"name", tool.name},
                     {"description", tool.description},
                     {"inputSchema", tool.input},
                     {"outputSchema", resultSchema(tool.list)},
-                    {"annotations", {{"readOnlyHint", true}, {"openWorldHint", false}}}});
+                    {"annotations", {{"readOnlyHint", !tool.writes}, {"openWorldHint", false}}}});
   }
   return list;
 }
 
 std::optional<Json> callTool(const std::string& name, const Json& arguments, Map& map) {
   const auto tool = std::ranges::find(tools(), name, &Tool::name);
-  if (tool == tools().end()) return std::nullopt;
+  if (tool == tools().end() || (tool->writes && !map.takesCorrections())) return std::nullopt;
   return resultOf(*tool, arguments, map);
 }
 

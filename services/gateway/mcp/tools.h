@@ -11,9 +11,9 @@ namespace perdure::gateway::mcp {
 
 using Json = nlohmann::ordered_json;
 
-/// Returns the tools with the JSON schemas of their arguments and results, as tools/list sends
-/// them.
-Json listTools();
+/// Returns the tools of a map with the JSON schemas of their arguments and results, as tools/list
+/// sends them.
+Json listTools(const Map& map);
 
 /// Returns the result of tools/call. It has isError if the arguments are wrong or the map has no
 /// answer. Returns nothing if there is no such tool.

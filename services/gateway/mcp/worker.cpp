@@ -6,9 +6,12 @@
 
 namespace perdure::gateway::mcp {
 
-Worker::Worker(const bus::Participant& participant,
+Worker::Worker(const bus::Participant& participant, bool takes_corrections,
                std::function<void(std::uint64_t, const Answer&)> reply)
-    : participant_(participant), reply_(std::move(reply)), thread_([this] { run(); }) {}
+    : participant_(participant),
+      takes_corrections_(takes_corrections),
+      reply_(std::move(reply)),
+      thread_([this] { run(); }) {}
 
 Worker::~Worker() {
   {
@@ -45,7 +48,7 @@ void Worker::run() {
     const Question question = std::move(waiting_.front());
     waiting_.pop_front();
     lock.unlock();
-    if (!map) map.emplace(participant_);
+    if (!map) map.emplace(participant_, takes_corrections_);
     reply_(question.number, answer(question.message, *map));
     lock.lock();
   }

@@ -22,7 +22,7 @@ struct Question {
 class Worker {
  public:
   /// `reply` is called in the thread, or in put().
-  Worker(const bus::Participant& participant,
+  Worker(const bus::Participant& participant, bool takes_corrections,
          std::function<void(std::uint64_t, const Answer&)> reply);
   ~Worker();
   Worker(const Worker&) = delete;
@@ -35,6 +35,7 @@ class Worker {
   void run();
 
   const bus::Participant& participant_;
+  const bool takes_corrections_;
   const std::function<void(std::uint64_t, const Answer&)> reply_;
   std::mutex mutex_;
   std::condition_variable changed_;

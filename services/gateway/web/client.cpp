@@ -71,6 +71,10 @@ void Client::accept(Request request, const std::string& protocol) {
   }));
   socket_.read_message_max(static_cast<std::size_t>(shared_->options.most_message_kb) << 10U);
   socket_.auto_fragment(false);
+  websocket::permessage_deflate compression;  // for clients that ask for it
+  compression.server_enable = true;
+  compression.compLevel = 1;  // JSON is then a quarter of its size, at the least cost
+  socket_.set_option(compression);
   auto kept = std::make_shared<Request>(std::move(request));
   socket_.async_accept(*kept, [self = shared_from_this(), kept](beast::error_code error) {
     self->onAccepted(error);

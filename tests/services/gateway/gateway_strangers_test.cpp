@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <regex>
 #include <thread>
@@ -163,12 +164,15 @@ class Drive {
 };
 
 /// Answers queries by id, class, place and for all objects about the first two cars of the drive.
+/// Takes corrections of them.
 class MapStore {
  public:
   explicit MapStore(const bus::Participant& participant)
       : replies_(participant, bus::kTopic<MapReply>),
         queries_(participant, bus::kTopic<MapQuery>),
+        corrections_(participant, bus::kTopic<MapCorrection>),
         loop_(participant) {
+    loop_.on(corrections_, [this](const MapCorrection& request) { correct(request); });
     loop_.on(queries_, [this](const MapQuery& query) { answer(query); });
     thread_ = std::thread([this] { loop_.run(); });
   }
@@ -189,17 +193,47 @@ class MapStore {
       if (query.kind == MapQueryKind::kById && query.object_id != id) continue;
       ObjectBelief car = objectAt(id, {10.0 * static_cast<double>(id), 3.0, 0});
       car.seen_from[8] = 20.0F;
+      perdure::correct(standing_, car);
       reply.objects.push_back(test::rowOf(car));
       if (query.kind == MapQueryKind::kById) reply.beliefs.push_back(car);
     }
     (void)replies_.write(reply);
   }
 
+  void correct(const MapCorrection& request) {
+    MapReply reply;
+    reply.client = request.client;
+    reply.request = request.request;
+    Correction made = request.correction;
+    if (made.withdrawn) {
+      made.object = standing_.begin()->first;
+      standing_.clear();
+    } else {
+      made.id = 4;
+      standing_ = {{made.object, {made}}};
+    }
+    reply.corrections = {made};
+    (void)replies_.write(reply);
+  }
+
+  CorrectionsOf standing_;
   bus::Writer<MapReply> replies_;
   bus::Reader<MapQuery> queries_;
+  bus::Reader<MapCorrection> corrections_;
   bus::WaitLoop loop_;
   std::thread thread_;
 };
+
+/// The truth of the drive in a frame with x to the left and the origin 5 m to the right of W's, as
+/// the demo writes it: the first car is (0.3, −0.4) m from its estimate, and the body drives at
+/// 1 cm/s.
+constexpr char kTruth[] = R"({
+  "path": [[0, 5, 0, 0, 0, 0, 0.70710678, 0.70710678], [1000, 5, 10, 0, 0, 0, 0.70710678, 0.70710678]],
+  "objects": [
+    {"id": 4, "class": "car", "size": [4, 1.8, 1.5], "from": 0, "until": 1e9, "moves": false,
+     "keys": [[0, 8.4, 10.3, 0, 2.0708]]},
+    {"id": 5, "class": "car", "size": [4, 1.8, 1.5], "from": 0, "until": 1, "moves": false,
+     "keys": [[0, 8, 10, 0, 2.0708]]}]})";
 
 class Strangers : public ::testing::Test {
  protected:
@@ -210,9 +244,14 @@ class Strangers : public ::testing::Test {
       GTEST_SKIP() << "npm is not here, or got nothing: clients of other people are not tried";
     }
     modules_ = modules;
-    gateway_ = std::make_unique<Child>(
-        std::vector<std::string>{(programs() / "perdure-gateway").string(), "--port", "0"},
-        folder_.file("log"));
+    std::ofstream(folder_.file("truth.json")) << kTruth;
+    start({"page.truth=" + folder_.file("truth.json")});
+  }
+  void start(const std::vector<std::string>& settings) {
+    std::vector<std::string> command{(programs() / "perdure-gateway").string(), "--port", "0"};
+    for (const std::string& setting : settings) command.insert(command.end(), {"--set", setting});
+    gateway_.reset();
+    gateway_ = std::make_unique<Child>(command, folder_.file("log"));
     const std::regex pattern("http://[^:]*:([0-9]+)/");
     std::smatch found;
     ASSERT_TRUE(eventually(20s, [&] {
@@ -271,6 +310,22 @@ TEST_F(Strangers, TheSdkOfTheModelContextProtocolAsksTheMap) {
       EXPECT_EQ(said["results"]["find_objects"]["items"], 2);
       EXPECT_EQ(status_, 0);
     }
+  }
+}
+
+TEST_F(Strangers, TheSdkOfTheModelContextProtocolCorrectsTheMapWhereThatIsAllowed) {
+  start({"http.token=s3cret"});
+  const Drive drive(participant_);
+  const MapStore store(participant_);
+  const std::string url = "http://127.0.0.1:" + port_ + "/mcp";
+  const std::string perdure = (programs() / "perdure").string();
+  for (const auto& transport : {std::vector<std::string>{"http", url, "s3cret", ""},
+                                {"stdio", "", perdure, "mcp", "--allow-corrections"}}) {
+    const json said = answerOf("mcp.mjs", transport);
+    ASSERT_TRUE(said.is_object()) << contentsOf(folder_.file("mcp.mjs")) << gateway_->log();
+    EXPECT_THAT(said["problems"], IsEmpty()) << said.dump(1);
+    EXPECT_EQ(said["tools"].size(), 6u);
+    EXPECT_EQ(said["results"]["correct"]["correction"]["withdrawn"], true);
   }
 }
 

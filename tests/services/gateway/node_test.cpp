@@ -614,6 +614,20 @@ TEST_F(GatewayNode, WhatIsOfBeforeDoesNotReplaceWhatIsNewer) {
   EXPECT_EQ(on(kObjects).at(0)["latency_ms"], -1);
 }
 
+TEST_F(GatewayNode, ObjectsHaveTheStandardDeviationOfTheBodyIfItsOdometryIsReceived) {
+  node_.setWanted({kObjects});
+  node_.onObjects(frameOf(5, {}), kSecond);
+  EXPECT_EQ(on(kObjects).back()["body_sigma"], -1);
+  Odometry odometry;
+  odometry.stamp = frameOf(6, {}).stamp;
+  odometry.world = frameOf(6, {}).world;
+  odometry.state = OdometryState::kTracking;
+  odometry.covariance.diagonal().segment<3>(3) << 0.04, 0.04, 0.01;
+  node_.onOdometry(odometry, kSecond);
+  node_.onObjects(frameOf(6, {}), kSecond);
+  EXPECT_DOUBLE_EQ(on(kObjects).back()["body_sigma"], 0.3);
+}
+
 TEST_F(GatewayNode, AnswersSayWhatLiesOnAnotherMap) {
   node_.onObjects(frameOf(1, {}), kSecond);
   node_.onMapFrame(frameOfMap());

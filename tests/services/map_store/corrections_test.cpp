@@ -174,6 +174,26 @@ TEST_F(CorrectedMap, SameObjectsAreOneWithTheNewerBelief) {
   EXPECT_EQ(near_.corrections[0].object + near_.corrections[0].other, 4u);
 }
 
+TEST_F(CorrectedMap, AQueryByTheIdOfAJoinedObjectFindsTheOther) {
+  ASSERT_TRUE(send(ofTwo(CorrectionKind::kSame, 1, 2)).ok);
+  const MapReply& reply = ask(MapQueryKind::kById, 2);
+  ASSERT_THAT(reply.objects, SizeIs(1));
+  EXPECT_EQ(reply.objects[0].id, 1u);
+  EXPECT_THAT(reply.corrections, SizeIs(1));
+}
+
+TEST_F(CorrectedMap, CorrectionsThatCannotBeReadAreReported) {
+  ASSERT_TRUE(send(notThere(1)).ok);
+  node_.reset();
+  ASSERT_TRUE(Connection::open(config_.store_path, Connection::Mode::kReadWriteCreate)
+                  .and_then([](const Connection& file) {
+                    return file.execute("ALTER TABLE corrections RENAME COLUMN nats TO bits");
+                  })
+                  .has_value());
+  start();
+  EXPECT_THAT(node_->trouble(), HasSubstr("no such column: nats"));
+}
+
 TEST_F(CorrectedMap, DifferentSeparatesWhatALoopJoinedUnlessItsEvidenceIsWeaker) {
   node_.reset();
   {

@@ -52,6 +52,33 @@ TEST(Corrections, OfJoinedTracksTheOneDetectedLastIsShown) {
   for (const ObjectBelief& own : objects.as_estimated) EXPECT_EQ(own.id, own.trackId());
 }
 
+TEST(Corrections, EventsAndOccludersHaveTheIdsOfJoinedObjects) {
+  using map_store::test::carAt;
+  Objects objects = map_store::test::workingSet(
+      1, {carAt(1, {0, 0, 0}), carAt(2, {5, 0, 0}), carAt(4, {20, 0, 0})});
+  objects.objects[1].last_seen += std::chrono::seconds(1);
+  objects.objects[2].blocked_by = 2;
+  Corrections corrections;
+  corrections.take({ofTwo(CorrectionKind::kSame, 2, 1, 0.0, 1)});
+  corrections.apply(objects);
+  EXPECT_EQ(objects.objects.at(1).blocked_by, 1u);
+  EXPECT_EQ(objects.as_estimated.at(2).blocked_by, 2u);
+  std::vector<Event> events(4);
+  events[0].object_id = 1;  // its track is not shown
+  events[1].object_id = 2;
+  events[2].object_id = 4, events[2].other_id = 2;
+  events[3].object_id = 5;
+  corrections.apply(events, objects);
+  ASSERT_THAT(events, SizeIs(3));
+  EXPECT_EQ(events[0].object_id, 1u);
+  EXPECT_EQ(events[1].other_id, 1u);
+  EXPECT_EQ(events[2].object_id, 5u);
+  objects.objects.erase(objects.objects.begin());
+  events[0].object_id = 1;
+  corrections.apply(events, objects);
+  EXPECT_THAT(events, SizeIs(3)) << "the object is gone with its last track";
+}
+
 /// Two runs of the same drive; only in one, a person states that a car is not there.
 TEST(Corrections, AnObjectFallsAndTheFiltersOwnBeliefStaysAsItWas) {
   Pair corrected, plain;

@@ -5,8 +5,11 @@
 
 #include <filesystem>
 #include <fstream>
+#include <nlohmann/json.hpp>
 
 #include "common/base/errors.h"
+#include "common/sim/truth.h"
+#include "tools/simulate/simulate.h"
 
 namespace perdure::tools {
 namespace {
@@ -63,6 +66,25 @@ TEST_F(DemoPlan, ShowsItWhereTheGatewayIsInstalled) {
   ASSERT_TRUE(gateway.has_value());
   EXPECT_THAT(gateway->command, Contains("http.port=8765"));
   EXPECT_GT(freePort(), 0);
+}
+
+TEST_F(DemoPlan, GivesThePageTheTruthOfASimulatedDrive) {
+  SimulateOptions drive;
+  drive.scene = "room";
+  drive.out = folder_ / "drive";
+  drive.world = {.seconds = 0.5, .width = 64, .height = 48};
+  simulate(drive, {});
+  options_.data = drive.out.string();
+  std::ofstream(folder_ / "perdure-gateway") << "";
+  const auto folders = prepareFolders(options_);
+  const fs::path file = folders.run / "truth.json";
+  EXPECT_THAT(planGateway(options_, folders, 1)->command, Contains("page.truth=" + file.string()));
+  const auto truth = nlohmann::json::parse(std::ifstream(file));
+  ASSERT_GT(truth["path"].size(), 5u);
+  EXPECT_EQ(truth["path"][0].size(), 8u);
+  EXPECT_EQ(truth["objects"].size(), sim::readTruth(drive.out).objects.size());
+  fs::remove(drive.out / "visibility_truth.csv");
+  EXPECT_THAT(planGateway(options_, folders, 1)->command, Not(Contains(HasSubstr("page.truth"))));
 }
 
 TEST_F(DemoPlan, ShapesAreOfThePriorsThatTheFiltersConfigurationNames) {

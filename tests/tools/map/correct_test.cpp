@@ -73,6 +73,18 @@ TEST_F(CorrectCommand, ACorrectionStandsUntilItIsWithdrawn) {
   EXPECT_EQ(run({"--list"}), "");
 }
 
+TEST_F(CorrectCommand, TheListOfAMapThatIsSentToAServerIsReadOnly) {
+  (void)run({"1", "--not-there"});
+  using map_store::Connection;
+  ASSERT_TRUE(Connection::open(path_, Connection::Mode::kReadWriteCreate)
+                  .and_then([](const Connection& file) {
+                    return file.execute("CREATE TABLE outbox(id INTEGER)");
+                  })
+                  .has_value());
+  EXPECT_THAT(run({"--list"}), HasSubstr("not_there  1"));
+  EXPECT_THAT(refusal({"2", "--not-there"}, ExitCode::kUsage), HasSubstr("is sent to a server"));
+}
+
 TEST_F(CorrectCommand, EachKindHasAnOption) {
   (void)run({"1", "--class", "car"});
   (void)run({"1", "--different-from", "2"});

@@ -2,6 +2,7 @@
 // maps.
 #include "tools/map/fuse.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -291,6 +292,26 @@ MapReply allOf(const std::string& path) {
   MapQuery query;
   query.limit = 1000;
   return MapFile(path).ask(query);
+}
+
+TEST_F(FuseFiles, CorrectionsBeyondTheLimitAreLeftOutAndCounted) {
+  const std::string a = first(), b = second();
+  const ObjectId of_b = allOf(b).objects.front().id;
+  const auto fill = [](const std::string& path, ObjectId id, std::size_t count) {
+    const auto file =
+        map_store::Connection::open(path, map_store::Connection::Mode::kReadWriteCreate);
+    const auto done = file->execute(fmt::format(
+        "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < {}) INSERT INTO "
+        "corrections SELECT i, 0, {}, 0, '', 0.001, '{}' || i, 0, 0 FROM n",
+        count, id, path));
+    ASSERT_TRUE(done.has_value()) << done.error().detail;
+  };
+  fill(a, allOf(a).objects.front().id, kMostCorrections);
+  fill(b, of_b, 3);
+  const FuseOutcome outcome = fuseFiles({{a, b}, out()});
+  EXPECT_EQ(allOf(out()).corrections.size(), kMostCorrections);
+  EXPECT_EQ(outcome.sumOf(&mapping::FusionReport::corrections_left_out), 3u);
+  EXPECT_THAT(toText(outcome), HasSubstr("3 corrections are left out, because a map has at most"));
 }
 
 TEST_F(FuseFiles, CorrectionsStandInTheFusedMapAndCanBeWithdrawnThere) {

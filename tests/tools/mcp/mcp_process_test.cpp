@@ -64,6 +64,17 @@ TEST_F(McpProcess, WritesOneAnswerALineAndNothingElse) {
   }
 }
 
+TEST_F(McpProcess, CorrectsAFileOnlyIfThatIsAllowed) {
+  const std::string call =
+      R"({"jsonrpc":"2.0","id":2,"method":"tools/call","params":{"name":"correct","arguments":)"
+      R"({"object":20,"kind":"same","other":10,"author":"Ada"}}})";
+  const std::string map = folder_.file("map.sqlite");
+  EXPECT_EQ(json::parse(outputOf(map, call))["error"]["code"], -32602);
+  const json made = json::parse(outputOf(map + " --allow-corrections", call))["result"];
+  EXPECT_EQ(made["structuredContent"]["object"]["id"], 10) << made.dump(1);
+  EXPECT_EQ(made["structuredContent"]["correction"]["author"], "Ada");
+}
+
 TEST_F(McpProcess, RefusesWhatIsNoMap) {
   EXPECT_THAT(outputOf(folder_.file("none.sqlite"), kPing), HasSubstr("There is no map"));
   EXPECT_EQ(status_, 69);

@@ -104,7 +104,7 @@ class Map:
         return self._ask(kind="by_box", low=corners.min(0), high=corners.max(0)).objects
 
     def get(self, object_id: int) -> Optional["messages.MapObject"]:
-        """The object with this id; None if it does not exist."""
+        """The object with this id, or to which it was joined; None if it does not exist."""
         objects = self._ask(kind="by_id", object_id=object_id).objects
         return objects[0] if objects else None
 
@@ -184,7 +184,8 @@ class Map:
 
     def __contains__(self, item) -> bool:
         """Whether the map has an object with this id, or this object's id."""
-        return self.get(getattr(item, "id", item)) is not None
+        object_id = getattr(item, "id", item)
+        return getattr(self.get(object_id), "id", None) == object_id  # not that of a joined one
 
     def __getitem__(self, object_id: int) -> "messages.MapObject":
         found = self.get(object_id)

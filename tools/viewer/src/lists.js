@@ -189,3 +189,16 @@ export function renderServices(element, health) {
   });
   element.innerHTML = articles.join('') || '<p class="empty">No data from services.</p>';
 }
+
+/** Parses a query: a number, "near 30" (m around the vehicle), "at 12 -40 30", or a class. */
+export function questionOf(text, model) {
+  const words = text.toLowerCase().split(/\s+/).filter(Boolean), numbers = words.slice(1).map(Number);
+  if (words.length === 0) return {};
+  if (/^\d+$/.test(words[0])) return { id: Number(words[0]) };
+  if (numbers.every(Number.isFinite)) {
+    const body = model.bodyInM();
+    if (words[0] === 'near' && numbers.length < 2) return { near: body, radius: numbers[0] ?? 30 };
+    if (words[0] === 'at' && numbers.length >= 2) return { near: [numbers[0], numbers[1], body[2]], radius: numbers[2] ?? 30 };
+  }
+  return { class: words.join(' ') };
+}

@@ -1,7 +1,7 @@
 // Assembles the page. Messages update the model, and the model updates map, lists and panels.
 import { CameraView } from './camera.js';
 import { Connection } from './connection.js';
-import { EventLog, ObjectList, renderServices } from './lists.js';
+import { EventLog, ObjectList, questionOf, renderServices } from './lists.js';
 import { wordsOfPart } from './graph_panel.js';
 import { Model, timeOf, troubleOf } from './model.js';
 import { Link } from './link.js';
@@ -10,12 +10,14 @@ import { Past } from './past.js';
 import { PlaybackBar } from './playback.js';
 import { renderPlots } from './plots.js';
 import { TimeLine } from './timeline.js';
+import { Truth, wordsOfError } from './truth.js';
 import { MARKS, escaped, lookOfLoop, wordsOfImage, wordsOfNoImage, wordsOfPlace, wordsOfTime } from './words.js';
 import { World } from './world.js';
 
 const $ = (id) => document.getElementById(id);
 const model = new Model();
 const status = { state: 'connecting', sentence: '' };
+const truth = await Truth.load(); // null, but for simulated drives
 
 function addressOfGateway() {
   const address = new URL(location.href);
@@ -38,9 +40,9 @@ try {
 const past = new Past();
 const camera = new CameraView($('camera'), $('image'), $('image-caption'), choose, (time, image) => { if (!connection.range) past.take('image', time, image); });
 const list = new ObjectList($('list').tBodies[0], $('list-note'), $('search'), model, choose);
-const log = new EventLog($('events'), $('events-filter'), model, choose, (at) => world?.lookAtPlace(at));
+const log = new EventLog($('events'), $('events-filter'), model, chooseLinked, (at) => world?.lookAtPlace(at));
 connection.onStatus = (sentence) => log.say(sentence);
-const panel = new ObjectPanel($('object'), model, connection, choose);
+const panel = new ObjectPanel($('object'), model, connection, chooseLinked);
 
 const playback = new PlaybackBar($('playback'), connection, model, lookBack);
 const timeline = new TimeLine($('timeline'), model, connection, playback, (group) => log.hides(group), choose);
@@ -74,6 +76,15 @@ function choose(id, { reveal = true, open = true } = {}) {
     panel.ask();
   }
 }
+
+/** Returns the id of the object to which `id` belongs now: people or the map may have joined it to
+    another one. */
+async function presentId(id) {
+  if (model.find(id)) return id;
+  const { objects } = await connection.call('/map/query', { id }).catch(() => ({}));
+  return objects?.[0]?.id ?? id;
+}
+async function chooseLinked(id) { choose(await presentId(id)); }
 
 /** Selects an anchor or a loop of the map's graph: {kind, id}. */
 function choosePart(part) {
@@ -161,22 +172,9 @@ function setAnswer(objects, note) {
 }
 $('search').addEventListener('input', () => setAnswer());
 $('ask-map').addEventListener('click', () => (model.answer?.objects ? setAnswer() : askMap()));
-/** Parses a query: a number, "near 30" (m around the vehicle), "at 12 -40 30", or a class. */
-function questionOf(text) {
-  const words = text.toLowerCase().split(/\s+/).filter(Boolean), numbers = words.slice(1).map(Number);
-  if (words.length === 0) return {};
-  if (/^\d+$/.test(words[0])) return { id: Number(words[0]) };
-  if (numbers.every(Number.isFinite)) {
-    const body = model.bodyInM();
-    if (words[0] === 'near' && numbers.length < 2) return { near: body, radius: numbers[0] ?? 30 };
-    if (words[0] === 'at' && numbers.length >= 2) return { near: [numbers[0], numbers[1], body[2]], radius: numbers[2] ?? 30 };
-  }
-  return { class: words.join(' ') };
-}
-
 async function askMap() {
   const word = $('search').value.trim();
-  const request = questionOf(word);
+  const request = questionOf(word, model);
   $('list-note').textContent = 'Waiting for the map …';
   try {
     const reply = await connection.call('/map/query', request);
@@ -208,6 +206,7 @@ const toggles = {
     for (const item of document.querySelectorAll('#legend [data-seen]')) item.hidden = !on;
     return on;
   },
+  u: () => truth?.toggle(model, world),
   c: () => {
     showsCamera = !showsCamera;
     $('camera').hidden = !showsCamera;
@@ -285,6 +284,7 @@ function figures(now) {
   const stands = connection.range && connection.playback?.status !== 'playing';
   if (frame) items.push(['time', wordsOfTime(model.time, model.origin), ''], ['objects', [...model.objects.values()].filter((o) => o.confirmed).length, '']);
   const map = model.mapFrame;
+  if (frame && model.truth) items.push(['error', wordsOfError(truth.errorsOfBody(model.drive.slice(-1))), 'minor']);
   if (frame && map) items.push(['sessions', map.sessions, 'minor'], ['loops', map.loops, 'minor'], ['σ in map', wordsOfPlace(map.body_sigma), 'minor']);
   if (frame) items.push(['rate', stands ? '–' : `${model.rate(now).toFixed(0)} Hz`, 'minor'], ['latency', frame.latency_ms >= 0 && model.silentFor(now) < 2 ? `${frame.latency_ms.toFixed(0)} ms` : '–', 'minor']);
   return items.map(([k, v, c]) => `<div class="${c}"><dt>${k}</dt><dd>${v}</dd></div>`).join('');
@@ -327,6 +327,7 @@ function refresh() {
     if (!document.querySelector('[data-panel=objects]').hidden) list.render();
     if (!document.querySelector('[data-panel=object]').hidden && (model.chosen || panel.part)) panel.part ? panel.renderPart() : panel.render();
     grant();
+    model.truth?.show(model, world);
     if (!document.querySelector('[data-panel=plots]').hidden) renderPlots($('plots'), model);
     showState();
     link.write();
@@ -344,7 +345,7 @@ function now4(rate) {
 }
 
 // The state of the page in its address. `wished` has what waits for data: an object, a time.
-const LAYERS = ['f', 'e', 'l', 'm', 'g', 's', 'c', 'b', 'r'];
+const LAYERS = ['f', 'e', 'l', 'm', 'g', 's', 'u', 'c', 'b', 'r'];
 const isOn = (key) => document.querySelector(`[data-key=${key}]`).getAttribute('aria-pressed') === 'true';
 if (matchMedia('(max-width: 760px)').matches) toggle('r');
 const listed = () => [...$('events-filter').children].filter((b) => b.getAttribute('aria-pressed') === 'true').map((b) => b.dataset.group).join();
@@ -384,8 +385,11 @@ function grant() {
     playback.seek(range.first + Number(wished.t), false);
     wished.t = undefined;
   }
-  if (wished.object && model.find(wished.object)) {
-    choose(wished.object, { open: false });
+  if (!wished.object) return;
+  if (model.find(wished.object)) choose(wished.object, { open: false });
+  else if (wished.asked !== wished.object && model.mapFrame) {
+    const asked = (wished.asked = wished.object);
+    presentId(asked).then((id) => { if (wished.object === asked) wished.object = id; });
   }
 }
 link.open();

@@ -8,10 +8,12 @@ export class Model {
     this.remembered = new Map(); // id → object, on the map, in M
     this.mapFrame = null; // the newest perdure.MapFrame
     this.graph = null; // the newest perdure.MapGraph
-    this.history = new Map(); // id → [[time, r, p, visible fraction, σ], …]
-    this.drive = []; // [[time, speed, latency, position], …]
+    this.history = new Map(); // id → [[time, r, p, visible fraction, largest σ, position, σ], …]
+    this.drive = []; // [[time, speed, latency, position, σ], …]
     this.cpu = new Map(); // process → [[time, share of a core], …]
     this.chosen = 0;
+    this.start = undefined; // the first pose of the shown W: {world, time, body}
+    this.truth = undefined; // Truth of a simulated drive, while it is shown
     this.frame = null; // the shown perdure.Objects without its objects
     this.past = undefined; // of live data: the earlier time that is shown
     this.health = null;
@@ -25,6 +27,7 @@ export class Model {
     const time = timeOf(message), world = worldOf(message);
     const another = this.newest !== undefined && (world !== this.newestWorld || time < this.newest - 2);
     if (another) this.jumped();
+    if (this.start?.world !== world) this.start = { world, time, body: message.body };
     this.newest = time;
     this.newestWorld = world;
     if (this.heardAt > 0) this.live = true; // not for the first message, which may be old
@@ -47,12 +50,12 @@ export class Model {
   }
 
   /** Stores the speed, from the positions of the last half second, and the latency. */
-  measure({ body, latency_ms: latency }, time) {
+  measure({ body, latency_ms: latency, body_sigma: sigma }, time) {
     const last = this.drive.at(-1);
     if (!body || (last && time - last[0] < SAMPLE_S)) return;
     const from = this.drive.at(-3) ?? last;
     const speed = from ? Math.hypot(...from[3].map((x, i) => body[i] - x)) / (time - from[0]) : NaN;
-    this.drive.push([time, speed, latency >= 0 ? latency : NaN, body.slice(0, 3)]);
+    this.drive.push([time, speed, latency >= 0 ? latency : NaN, body.slice(0, 3), sigma]);
     if (this.drive.length > SAMPLES) this.drive.shift();
   }
 
@@ -72,7 +75,7 @@ export class Model {
     if (!samples) this.history.set(o.id, (samples = []));
     const last = samples.at(-1);
     if (last && time - last[0] < SAMPLE_S && time >= last[0]) return;
-    samples.push([time, o.r, o.p, o.fraction, Math.sqrt(Math.max(0, o.cov[0], o.cov[3], o.cov[5]))]);
+    samples.push([time, o.r, o.p, o.fraction, Math.sqrt(Math.max(0, o.cov[0], o.cov[3], o.cov[5])), o.c, Math.sqrt(o.cov[0] + o.cov[3] + o.cov[5])]);
     if (samples.length > SAMPLES) samples.shift();
   }
 

@@ -1,6 +1,7 @@
 // Shows all data of one object. While open, requests them from the gateway twice a second.
 import { Corrections } from './corrections.js';
 import { chart } from './plots.js';
+import { wordsOfError } from './truth.js';
 import { classWords, colourOf, escaped, existenceWords, isHidden, isInSight, percent, visibilityWords } from './words.js';
 
 const EVERY_MS = 500;
@@ -10,6 +11,7 @@ export class ObjectPanel {
     this.element = element;
     this.model = model;
     this.connection = connection;
+    this.onLink = onLink;
     this.id = 0;
     this.part = this.told = null;
     this.corrections = new Corrections(connection);
@@ -62,6 +64,7 @@ export class ObjectPanel {
     try {
       const full = await this.connection.call('/object', { id });
       if (id !== this.id) return;
+      if (full.object && full.object.id !== id) return this.onLink(full.object.id); // it was joined to another one
       this.note = full.found === false ? 'It is neither in the working set nor on the map any more.' : '';
       if (full.found !== false) this.full = full;
       this.latency ??= performance.now() - this.shown;
@@ -85,7 +88,6 @@ export class ObjectPanel {
     const top = this.element.scrollTop;
     this.element.firstChild.innerHTML = this.heading(o) + this.whereWords(o) + this.existenceChart(o) + this.classes() + this.ledger() + this.margins() + this.place(o) + this.covariance();
     this.element.scrollTop = top;
-    this.element.dataset.object = String(this.id);
   }
 
   heading(o) {
@@ -194,6 +196,7 @@ export class ObjectPanel {
       ['length', pm(o.size[0], o.size_sigma?.[0], 'm')], ['width', pm(o.size[1], o.size_sigma?.[1], 'm')], ['height', pm(o.size[2], o.size_sigma?.[2], 'm')],
       ['seen', `${o.hits ?? '?'} times, first ${this.ago(o.first_s)}, last ${this.ago(o.last_s)}`],
     ];
+    if (this.model.truth) rows.push(['error', wordsOfError(this.model.truth.errorsOf(o, this.model))]);
     if ((o.moving ?? 0) > 0.01) rows.push(['moves', `${percent(o.moving)}, ${Math.hypot(...o.velocity).toFixed(1)} m/s`]);
     const frame = this.model.objects.has(o.id) ? 'odom' : 'map';
     return `<h3>Where it is in ${frame}, and how large</h3><p class="dim">± one standard deviation</p><table>${rows.map(([k, v]) => `<tr><td class="dim">${k}</td><td>${v}</td></tr>`).join('')}</table>`;

@@ -1,5 +1,5 @@
 // Charts of quantities over time, as SVG: existence, σ, speed, latency, CPU.
-import { escaped, wordsOf } from './words.js';
+import { TRUE_COLOUR, escaped, wordsOf, wordsOfTime } from './words.js';
 
 const MOST_POINTS = 300, GAP_S = 3, COLOURS = ['#4aa3ff', '#f5bf40', '#49c281', '#c58cff', '#f0625d', '#5fd0d8', '#cd7369', '#9fb6cc'];
 
@@ -36,13 +36,22 @@ export function chart(title, series, { high, least = 0.1, say, shaded = [], curs
     <p class="series">${names}${shaded.length ? '<span>shaded: not visible</span>' : ''}</p>`;
 }
 
-/** Shows σ of the selected object, and speed, latency and CPU. */
+/** Returns charts of error and 2 σ, of the vehicle and of the selected object. */
+function errorCharts(model, o) {
+  const { truth, past } = model;
+  if (!truth) return '';
+  const one = (title, errors, none) => chart(`Error of ${title}`, [{ name: 'error', colour: TRUE_COLOUR, samples: (errors ?? []).map((s) => [s[0], s[1]]) }, { name: '2 σ', colour: COLOURS[0], samples: (errors ?? []).map((s) => [s[0], 2 * s[2]]) }], { say: (v) => `${v.toFixed(2)} m`, cursor: past, none });
+  return one('the vehicle', truth.errorsOfBody(model.drive), 'no data yet') + (o ? one(escaped(wordsOf(o)), truth.errorsOf(o, model), `No true ${escaped(o.class)} is within 3 m.`) : '')
+    + `<p class="dim">Truth is aligned in position and yaw at ${wordsOfTime(model.start.time, model.origin)}, the first pose that this page received. σ is the root of the covariance's trace.</p>`;
+}
+
+/** Shows errors if the truth is shown, σ of the selected object, speed, latency and CPU. */
 export function renderPlots(element, model) {
   const o = model.find(model.chosen), cursor = model.past, played = model.origin > 0;
   const unit = (digits, name) => (v) => `${v.toFixed(digits)} ${name}`;
   const line = (name, samples, k, colour = COLOURS[0]) => ({ name, colour, samples: samples.map((s) => [s[0], s[k]]) });
   const sigma = o ? model.history.get(o.id) ?? [] : [];
-  element.innerHTML = chart(o ? `Standard deviation of ${escaped(wordsOf(o))}` : 'Standard deviation of an object', [line('largest of x, y, z', sigma, 4)], { say: unit(2, 'm'), cursor, none: o ? 'no data yet' : 'Select an object.' })
+  element.innerHTML = errorCharts(model, o) + chart(o ? `Standard deviation of ${escaped(wordsOf(o))}` : 'Standard deviation of an object', [line('largest of x, y, z', sigma, 4)], { say: unit(2, 'm'), cursor, none: o ? 'no data yet' : 'Select an object.' })
     + chart('Speed', [line('vehicle', model.drive, 1)], { say: unit(1, 'm/s'), least: 1, cursor })
     + chart('Latency', [line('from capture to objects', model.drive, 2)], { say: unit(0, 'ms'), least: 10, cursor, none: played ? 'A recording has no latency.' : 'no data yet' })
     + chart('CPU', [...model.cpu].map(([process, samples], i) => line(escaped(process), samples, 1, COLOURS[i % COLOURS.length])), { say: (v) => `${(100 * v).toFixed(0)} %`, cursor, none: played ? 'The recording has no topic health.' : 'no data yet' });

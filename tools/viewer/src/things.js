@@ -9,7 +9,7 @@ const SPHERE = new THREE.SphereGeometry(1, 20, 12);
 const UP = new THREE.Vector3(0, 0, 1), PALE = new THREE.Color('#c4d0dc');
 
 /** Returns the edges of a box. Dashes are about 0.3 m long, whatever the length of the edge. */
-function outline(size, dashed) {
+export function outline(size, dashed) {
   const [l, w, h] = size.map((s) => s / 2);
   const corner = (i) => new THREE.Vector3(i & 1 ? l : -l, i & 2 ? w : -w, i & 4 ? h : -h);
   const edges = [[0, 1], [2, 3], [4, 5], [6, 7], [0, 2], [1, 3], [4, 6], [5, 7], [0, 4], [1, 5], [2, 6], [3, 7]]

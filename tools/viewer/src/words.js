@@ -23,6 +23,7 @@ export function colourOfAge(age) {
   return age < LATER_S ? mixed(FRESH, LATER, t(SOME_S, LATER_S)) : mixed(LATER, OLD, t(LATER_S, OLD_S));
 }
 
+export const TRUE_COLOUR = '#ff6ad5';
 export const isHidden = (o) => o.visibility === 'occluded';
 export const isInSight = (o) => o.visibility === 'visible' || o.visibility === 'partial';
 /** Returns the object's class for the style sheet. */

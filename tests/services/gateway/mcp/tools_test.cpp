@@ -77,6 +77,26 @@ TEST_F(McpTools, EachAnswerHasProbabilityAgeAndEntriesThatSumToIt) {
   EXPECT_EQ(object["evidence"].size(), 3u);
 }
 
+TEST_F(McpTools, CorrectsTheMapOnlyWhereThatIsAllowed) {
+  const std::string wrong = R"({"object":1,"kind":"not_there","nats":2.5})";
+  EXPECT_FALSE(mcp::callTool("correct", Json::parse(wrong), town_).has_value());
+  EXPECT_EQ(mcp::listTools(town_).size(), 5u);
+  town_.takes_corrections = true;
+  const Json tools = mcp::listTools(town_);
+  ASSERT_EQ(tools.size(), 6u);
+  EXPECT_EQ(tools[5]["annotations"]["readOnlyHint"], false);
+  const Json answer = answerTo("correct", wrong);
+  expectSum(answer["object"]);
+  EXPECT_EQ(answer["object"]["evidence"]["person"]["log_odds"], -2.5);
+  EXPECT_EQ(answer["correction"]["author"], "assistant");
+  EXPECT_EQ(answerTo("correct", R"({"withdraw":3})")["correction"]["withdrawn"], true);
+  for (const char* unfit : {"{}", R"({"object":1})", R"({"object":1,"kind":"same"})",
+                            R"({"object":1,"kind":"class"})", R"({"kind":"not_there"})"}) {
+    EXPECT_THAT(refusalOf("correct", unfit), HasSubstr("correct as {\"object\": 12")) << unfit;
+  }
+  EXPECT_THAT(refusalOf("correct", R"({"object":1,"kind":"gone"})"), HasSubstr("not_there"));
+}
+
 TEST_F(McpTools, WhatTheLedgerLacksIsAnEntry) {
   town_.beliefs[0].why = {};
   const Json bare = answerTo("why", R"({"id":1})")["object"];

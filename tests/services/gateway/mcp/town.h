@@ -67,6 +67,17 @@ class Town : public mcp::Map {
     return reply;
   }
 
+  bool takesCorrections() const override { return takes_corrections; }
+  Correction correct(const Correction& correction) override {
+    Correction made = correction;
+    if (made.id == 0) made.id = 3;
+    if (made.object == 0) made.object = 1;  // the withdrawn one is about it
+    if (made.withdrawn) return made;
+    for (ObjectBelief& belief : beliefs) perdure::correct({{made.object, {made}}}, belief);
+    return made;
+  }
+
+  bool takes_corrections = false;
   mcp::State state;
   std::vector<ObjectBelief> beliefs;
   std::vector<MapAnchor> anchors;

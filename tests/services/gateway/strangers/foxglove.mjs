@@ -54,6 +54,7 @@ function decode(channel, data) {
   return { ...value, data: Buffer.from(value.data).toString('base64'), timestamp: { sec: value.timestamp.sec, nsec: value.timestamp.nsec } };
 }
 
+socket.on('open', () => { if (!socket.extensions.includes('permessage-deflate')) fail('the gateway does not compress for a client that asks'); });
 client.on('error', (e) => fail(`error: ${e.message ?? e}`));
 client.on('status', (s) => { if (s.level > 0) fail(`status: ${s.message}`); });
 client.on('serverInfo', (info) => { if (!info.capabilities.includes('time')) fail('no capability time'); });

@@ -66,6 +66,14 @@ if (first) {
   await call('never_seen', { near: first.position_m.slice(0, 2), radius_m: 30 });
 } else fail('the map has no object');
 
+// Corrections, if the server takes them: one that lowers the probability, and its withdrawal.
+if (first && tools.some((t) => t.name === 'correct')) {
+  const made = await call('correct', { object: first.id, kind: 'not_there', nats: 2.5, author: 'Ada' });
+  if (made?.object.evidence.person?.log_odds !== -2.5 || made.correction.author !== 'Ada') fail(`a correction: ${JSON.stringify(made)}`);
+  const after = await call('correct', { withdraw: made?.correction.id });
+  if (after?.object.probability !== first.probability) fail(`a withdrawn correction: ${after?.object.probability}, before ${first.probability}`);
+} else if (!(await client.callTool({ name: 'correct', arguments: {} }).then(() => false, (error) => error.code === -32602))) fail('corrections are taken');
+
 const refused = await client.callTool({ name: 'why', arguments: { id: 'x' } });
 if (!refused.isError) fail('a wrong argument is accepted');
 await client.callTool({ name: 'no_such_tool', arguments: {} }).then(() => fail('an unknown tool is accepted'),

@@ -374,6 +374,61 @@ check(await page.evaluate(() => ![...window.perdure.connection.topics.values()].
 check(await page.evaluate(() => window.perdure.world.seen.visible) === false, 'S again: no ground is coloured');
 check(await page.evaluate(() => [...window.perdure.world.things.values()][0].material.color.getHexString()) === classColour, 'S again: the colour of the class');
 
+// Key U, for simulated drives only: true objects and path, and errors against σ.
+figures.truth = await page.evaluate(async () => {
+  const { model, world, choose } = window.perdure;
+  const off = model.truth, button = document.querySelector('[data-key=u]');
+  choose(1);
+  button.click();
+  await new Promise((r) => setTimeout(r, 600));
+  const { truth } = model, [time, body] = truth.errorsOfBody(model.drive).at(-1);
+  const words = { panel: document.getElementById('object').innerText.match(/error\s+(.*)/)?.[1], bar: document.getElementById('figures').innerText.match(/error\s+(.*)/i)?.[1] };
+  const partners = [1, 2].map((id) => truth.partner(model.objects.get(id), model.time)?.id);
+  const path = truth.line.geometry.attributes.position;
+  const drawn = { boxes: truth.boxes.geometry.attributes.position.count, way: [0, 1].map((i) => [path.getX(i), path.getY(i)].map((v) => v.toFixed(1))), yaw: truth.yaw };
+  // At the first pose, the body was 1 cm/s times its time ahead of the origin of the truth.
+  const error = Math.hypot(0.3 - 0.01 * model.start.time, 0.4).toFixed(2);
+  return { off, error, hidden: button.hidden, drawn, words, partners, grown: body - 0.01 * (time - model.start.time), shown: truth.group.visible && world.scene.children.includes(truth.group) };
+});
+const { truth } = figures;
+check(truth.off === undefined && !truth.hidden && truth.shown, `U: the truth is shown (${JSON.stringify(truth)})`);
+check(truth.drawn.boxes === 26 && Math.abs(truth.drawn.yaw + Math.PI / 2) < 1e-3 && String(truth.partners) === '4,', `true objects that are present, aligned by the first pose (${JSON.stringify(truth)})`);
+check(truth.words.panel === `${truth.error} m, σ 0.35 m` && truth.words.bar?.endsWith('σ 1.73 m') && Math.abs(truth.grown) < 0.005, `errors against σ (${JSON.stringify(truth)})`);
+await page.keyboard.press('5');
+await pause(600);
+const errors = await page.$eval('#plots', (e) => e.innerText);
+for (const words of ['Error of the vehicle', 'Error of car 1', `error ${truth.error} m`, '2 σ 0.69 m', 'first pose that this page received']) check(errors.includes(words), `plots of errors: "${words}" (${errors})`);
+await page.screenshot({ path: join(out, 'truth.png') });
+await page.keyboard.press('u');
+check(await page.evaluate(async () => {
+  const { model } = window.perdure, { Truth } = await import('./truth.js'), { fetch } = window, hides = model.truth === undefined;
+  window.fetch = () => Promise.resolve(new Response('null'));
+  const none = await Truth.load();
+  window.fetch = fetch;
+  const button = document.querySelector('[data-key=u]'), { hidden } = button;
+  button.hidden = false;
+  return hides && none === null && hidden;
+}), 'without truth there is no switch');
+
+// An id that was joined to another object selects that object: by a link, the address, and when it is joined.
+const joined = await page.evaluate(async () => {
+  const { connection, model, choose } = window.perdure, call = connection.call.bind(connection), wait = (ms) => new Promise((r) => setTimeout(r, ms));
+  connection.call = (name, request) => (request.id !== 99 ? call(name, request) : Promise.resolve(name === '/object' ? { object: model.objects.get(2) } : { objects: [{ id: 2 }] }));
+  const chosen = [];
+  for (const way of [
+    () => { document.getElementById('events').insertAdjacentHTML('beforeend', '<li data-object="99">car 99</li>'); document.querySelector('[data-object="99"]').click(); },
+    () => { history.replaceState(null, '', '#object=99'); dispatchEvent(new HashChangeEvent('hashchange')); },
+    () => { document.querySelector('[data-tab=object]').click(); choose(99); }]) {
+    choose(0);
+    way();
+    for (let i = 0; i < 100 && model.chosen !== 2; ++i) await wait(100);
+    chosen.push(model.chosen);
+  }
+  connection.call = call;
+  return chosen;
+});
+check(String(joined) === '2,2,2', `ids that were joined to another object (${joined})`);
+
 // The time line: a row for each object, marks of events by the filter, and earlier times of live data.
 await page.keyboard.press('1');
 const rows = await page.evaluate(() => [...document.querySelectorAll('#rows button')].map((r) => r.getAttribute('aria-label')).sort().join());
