@@ -131,7 +131,8 @@ std::string datasetsIn(const std::filesystem::path& folder) {
   std::vector<std::string> names;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
     const bool known =
-        entry.is_directory() && (readerOf(entry.path()) || hasMessages(entry.path()));
+        entry.is_directory() &&
+        (readerOf(entry.path()) || hasMessages(entry.path()) || looksLikeGoPro(entry.path()));
     if (known) names.push_back(entry.path().filename());
   }
   std::ranges::sort(names);
@@ -143,7 +144,7 @@ Recording readRecording(const DatasetOptions& options) {
   if (!std::filesystem::is_directory(path)) {
     std::error_code error;
     if (std::filesystem::exists(path, error) && hasMessages(path)) return readMessages(options);
-    if (looksLikePhone(path)) return readPhone(options);
+    if (looksLikeGoPro(path)) return readPhone(options);
     if (std::filesystem::is_regular_file(path, error)) refuseFile(path);
     throwMissing(
         path, "the dataset folder",
@@ -155,7 +156,8 @@ Recording readRecording(const DatasetOptions& options) {
   const bool messages = hasMessages(path);
   if (folder && messages) refuseBoth(path);
   if (folder) return (*folder)(options);
-  if (messages) return readMessages(options);
+  if (messages) return readMessages(options);  // films beside them may be for people
+  if (looksLikeGoPro(path)) return readPhone(options);
   if (const std::string names = datasetsIn(path); !names.empty()) {
     throw StartupError(ExitCode::kUnavailable,
                        "{} is no dataset folder, but it has {} inside: give --data one of these",

@@ -29,9 +29,10 @@ bool looksLikeKittiTracking(const std::filesystem::path& folder);
 /// The folder has colour images with one pose file each, or is a scene of such sequences (seq-01
 /// …).
 bool looksLikeSevenScenes(const std::filesystem::path& folder);
-/// The folder was written by a logger of a phone, or it has or is a film of a GoPro
-/// (phone/parts.h).
+/// The folder was written by a logger of a phone (phone/parts.h).
 bool looksLikePhone(const std::filesystem::path& folder);
+/// The path is a film, or a folder with a film that has a GoPro's telemetry. readPhone() reads it.
+bool looksLikeGoPro(const std::filesystem::path& path);
 /// Reads a recording of `perdure record`. Frames are numbered from 0 in the order of their times. A
 /// recording without images has the frames of its odometry, without pixels.
 Recording readRecordedDrive(const DatasetOptions& options);

@@ -51,9 +51,15 @@ bool hasFilmTrack(const std::filesystem::path& file, const std::string& code) {
 Result<std::vector<FilmPacket>> readFilmTrack(const std::filesystem::path& file,
                                               const std::string& code) {
   const OpenedFilm film = openFilm(file);
-  const AVStream* track = film ? trackOf(*film, code) : nullptr;
+  if (!film) {
+    return fail("film_unreadable",
+                "{} cannot be read as a film: the recording was not finished, or the copy is not "
+                "whole; copy it again",
+                file.string());
+  }
+  const AVStream* track = trackOf(*film, code);
   if (track == nullptr) {
-    return fail("film_unreadable", "{} has no track of data `{}`", file.string(), code);
+    return fail("film_no_track", "{} has no track of data `{}`", file.string(), code);
   }
   const std::int64_t start = startOfFrames(*film);
   std::vector<FilmPacket> packets;

@@ -17,8 +17,8 @@ struct FilmPacket {
 
 /// Whether the film has a track of data with this four-character code.
 bool hasFilmTrack(const std::filesystem::path& file, const std::string& code);
-/// Reads the packets of that track, in the order of the file. Reason: film_unreadable (no film, not
-/// finished, or without the track).
+/// Reads the packets of that track, in the order of the file. Reasons: film_unreadable (no film, or
+/// not finished), film_no_track.
 Result<std::vector<FilmPacket>> readFilmTrack(const std::filesystem::path& file,
                                               const std::string& code);
 

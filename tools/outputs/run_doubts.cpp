@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
 
 namespace perdure::tools {
@@ -57,7 +58,10 @@ std::uint64_t imagesLost(const ReasonCounts& capture) {
 
 Doubts doubtsOfRun(const RunFacts& facts) {
   Doubts doubts = doubtsOfFindings(facts.findings);
-  const char* first = doubts.empty() ? "" : "see the cause above; otherwise ";
+  const bool caused = std::ranges::any_of(facts.findings, [](const auto& finding) {
+    return finding.grade == replay::DataFinding::Grade::kCause;
+  });
+  const char* first = caused ? "see the cause above; otherwise " : "";
   for (const Rule& rule : kRules) {
     const std::uint64_t times = facts.vio.of(rule.code);
     if (rule.one_of * times <= facts.frames) continue;

@@ -103,7 +103,7 @@ class Pipeline {
   // These functions are in pipeline_checks.cpp.
   void checkData();
   void checkDetectionFile();
-  void checkClasses(const semantic_filter::ClassPriors& priors);
+  void checkClasses();
   std::vector<EstimatedHeight> estimatedHeights() const;
   void judgeMotion();
   void refuseUnwritten() const;
@@ -137,7 +137,8 @@ class Pipeline {
   std::unique_ptr<replay::Dataset> dataset_;
   replay::DataFindings findings_;
   std::unique_ptr<OutputWriter> outputs_;
-  std::optional<Doubt> box_doubt_;             ///< boxes that move otherwise than objects at rest
+  std::optional<Doubt> box_doubt_;  ///< boxes that move otherwise than objects at rest
+  semantic_filter::ClassPriors priors_;
   std::map<std::string, ShapePoints> shapes_;  ///< shapes of the class priors
   std::unique_ptr<replay::RecordingWriter> run_;
   std::int64_t run_ns_ = 0;

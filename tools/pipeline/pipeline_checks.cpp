@@ -58,7 +58,10 @@ void warnOfBoxes(const replay::DetectionFile& file, const std::string& name, std
   const auto warn = [&](const char* code, const std::string& text) {
     findings.push_back({replay::DataFinding::Grade::kWarning, code, name + ": " + text});
   };
-  if (!file.note().empty()) warn("boxes_from_one", file.note());
+  if (!file.note().empty()) {
+    findings.push_back(
+        {replay::DataFinding::Grade::kNote, "boxes_from_one", name + ": " + file.note()});
+  }
   if (const std::string why = file.whyBeyond(); !why.empty()) {
     warn("boxes_outside", why);
   }
@@ -178,13 +181,13 @@ void Pipeline::checkDetectionFile() {
 }
 
 /// Warns of classes without a prior, whose objects get the broad fallback.
-void Pipeline::checkClasses(const semantic_filter::ClassPriors& priors) {
+void Pipeline::checkClasses() {
   std::vector<std::string> known;
-  for (const auto& prior : priors.classes) known.push_back(prior.name);
+  for (const auto& prior : priors_.classes) known.push_back(prior.name);
   std::string names;
   constexpr std::size_t kFew = 10;  // of a tenth of the boxes nothing need be said
   for (const auto& [name, rows] : detection_file_->classCounts()) {
-    if (std::ranges::find(known, name) != known.end() || name == priors.other.name) continue;
+    if (std::ranges::find(known, name) != known.end() || name == priors_.other.name) continue;
     const std::string near = nearestWord(name, known);
     if (near.empty() && !replay::parseNumber(name) && kFew * rows < detection_file_->rows())
       continue;
@@ -202,11 +205,10 @@ void Pipeline::checkClasses(const semantic_filter::ClassPriors& priors) {
 
 std::vector<EstimatedHeight> Pipeline::estimatedHeights() const {
   constexpr int kHeight = 6;
-  const auto priors = semantic_filter::loadPriors(configs_.semantic_filter);
   std::vector<EstimatedHeight> heights;
   for (const auto& object : outputs_->history().lastBeliefs()) {
     const ClassBelief& best = object.best();
-    const auto& prior = priors.of(best.name);
+    const auto& prior = priors_.of(best.name);
     if (!object.confirmed || prior.name.empty()) continue;
     heights.push_back({best.mean[kHeight] - prior.log_size.z(),
                        std::sqrt(best.covariance(kHeight, kHeight)),

@@ -81,9 +81,9 @@ InstanceId Pipeline::instanceOf(InstanceId service) const {
 }
 
 void Pipeline::openFilter() {
-  const auto priors = semantic_filter::loadPriors(configs_.semantic_filter);
-  shapes_ = semantic_filter::shapePoints(priors);
-  if (detection_file_) checkClasses(priors);
+  priors_ = semantic_filter::loadPriors(configs_.semantic_filter);
+  shapes_ = semantic_filter::shapePoints(priors_);
+  if (detection_file_) checkClasses();
   semantic_filter::Outputs sinks;
   sinks.objects = [this](const Objects& objects) {
     ++counts_.objects;
@@ -99,7 +99,7 @@ void Pipeline::openFilter() {
     timer_.timeTowardsNext("outputs", [&] { outputs_->onEvent(event); });
   };
   sinks.predictions = [this](const Predictions& predictions) { expected_ = predictions; };
-  filter_ = std::make_unique<semantic_filter::Node>(configs_.semantic_filter, priors,
+  filter_ = std::make_unique<semantic_filter::Node>(configs_.semantic_filter, priors_,
                                                     instanceOf(kFilter), std::move(sinks));
   const auto file = outputs_->folder() / "map.sqlite";
   options_.map.empty() ? MapMemory::clear(file) : MapMemory::copy(options_.map, file);

@@ -10,6 +10,7 @@
 #include "common/base/algorithms/folder.h"
 #include "common/base/algorithms/median.h"
 #include "common/base/errors.h"
+#include "common/replay/files/text_file.h"
 #include "common/replay/phone/gpmf.h"
 #include "common/replay/phone/parts.h"
 #include "common/replay/recording.h"
@@ -35,6 +36,7 @@ struct Block {
 struct Telemetry {
   std::vector<Block> gyro, accel;
   std::vector<Eigen::Quaterniond> image_turns;  ///< of the images against the camera's body
+  std::size_t damaged = 0;                      ///< number of packets and blocks
 };
 
 const GpmfItem* find(const std::vector<GpmfItem>& items, std::string_view key) {
@@ -62,23 +64,29 @@ std::vector<Eigen::Matrix<double, N, 1>> vectorsOf(const std::vector<GpmfItem>& 
   return vectors;
 }
 
-void addBlock(const std::vector<GpmfItem>& items, const GpmfItem& item, Duration in_film,
+/// Returns false if the block is damaged.
+bool addBlock(const std::vector<GpmfItem>& items, const GpmfItem& item, Duration in_film,
               std::vector<Block>& blocks) {
   constexpr double kMicrosecond = 1e-6, kMost_us = 1e15;
   Block block{.in_film_s = toSeconds(in_film), .values = vectorsOf<3>(items, item)};
-  if (block.values.empty()) return;
+  if (block.values.empty()) return item.count == 0;
   const auto stamp = numberIn(items, "STMP"), total = numberIn(items, "TSMP");
-  if (stamp && *stamp < kMost_us) block.stamp_s = *stamp * kMicrosecond;
+  if (stamp && std::abs(*stamp) < kMost_us) block.stamp_s = *stamp * kMicrosecond;
   const double before =
       blocks.empty() ? 0.0 : blocks.back().first + static_cast<double>(blocks.back().values.size());
   block.first = total ? *total - static_cast<double>(block.values.size()) : before;
-  if (blocks.empty() || block.first > blocks.back().first) blocks.push_back(std::move(block));
+  if (!blocks.empty() && !(block.first > blocks.back().first)) return false;
+  blocks.push_back(std::move(block));
+  return true;
 }
 
 void addStream(const std::vector<GpmfItem>& items, Duration in_film, Telemetry& telemetry) {
   for (const GpmfItem& item : items) {
-    if (item.key == "GYRO") addBlock(items, item, in_film, telemetry.gyro);
-    if (item.key == "ACCL") addBlock(items, item, in_film, telemetry.accel);
+    const bool gyro = item.key == "GYRO";
+    if (gyro || item.key == "ACCL") {
+      auto& blocks = gyro ? telemetry.gyro : telemetry.accel;
+      if (!addBlock(items, item, in_film, blocks)) ++telemetry.damaged;
+    }
     if (item.key != "IORI") continue;
     for (const Eigen::Vector4d& q : vectorsOf<4>(items, item)) {
       if (q.norm() > 0.5) {
@@ -103,18 +111,20 @@ bool addItems(std::string_view text, Duration in_film, Telemetry& telemetry, int
 }
 
 Telemetry readTelemetry(const fs::path& film, Recording& recording) {
+  refuseUnreadable(film);
   const auto packets = vision::readFilmTrack(film, kTelemetry);
   if (!packets) {
-    throw StartupError(ExitCode::kData,
-                       "{}; without telemetry a film has no inertial samples: copy the file as the "
-                       "camera (GoPro, HERO5 or later) wrote it, not converted",
-                       packets.error().detail);
+    const bool converted = packets.error().code == "film_no_track";
+    throw StartupError(ExitCode::kData, "{}{}", packets.error().detail,
+                       converted ? ", so there are no inertial samples: copy the file as the "
+                                   "camera (GoPro, HERO5 or later) wrote it, not converted"
+                                 : "");
   }
   Telemetry telemetry;
   for (const vision::FilmPacket& packet : *packets) {
-    if (!addItems(packet.bytes, packet.start, telemetry))
-      recording.reasons.add("telemetry_damaged");
+    if (!addItems(packet.bytes, packet.start, telemetry)) ++telemetry.damaged;
   }
+  if (telemetry.damaged > 0) recording.reasons.add("telemetry_damaged", telemetry.damaged);
   return telemetry;
 }
 
@@ -132,11 +142,21 @@ std::vector<double> timesByPackets(const std::vector<Block>& blocks) {
   return {fitted.begin(), fitted.end()};
 }
 
-/// The same by the stamps of the camera's clock, moved to the time of the film.
-std::vector<double> timesByStamps(const std::vector<Block>& blocks) {
-  std::vector<double> offsets, times;
-  for (const Block& block : blocks) offsets.push_back(block.in_film_s - *block.stamp_s);
-  const double offset = medianOf(std::move(offsets));
+/// What is added to the stamps of the camera's clock, which both sensors share, for the time in the
+/// film; nothing if a block has no stamp.
+std::optional<double> clockOffset(const Telemetry& telemetry) {
+  std::vector<double> offsets;
+  for (const auto* blocks : {&telemetry.gyro, &telemetry.accel}) {
+    for (const Block& block : *blocks) {
+      if (!block.stamp_s) return std::nullopt;
+      offsets.push_back(block.in_film_s - *block.stamp_s);
+    }
+  }
+  return medianOf(std::move(offsets));
+}
+
+std::vector<double> timesByStamps(const std::vector<Block>& blocks, double offset) {
+  std::vector<double> times;
   for (const Block& block : blocks) times.push_back(*block.stamp_s + offset);
   return times;
 }
@@ -154,7 +174,8 @@ double usualStep(const std::vector<Block>& blocks, const std::vector<double>& ti
                      where, step_s);
 }
 
-Stream streamOf(const std::vector<Block>& blocks, const std::string& where) {
+Stream streamOf(const std::vector<Block>& blocks, std::optional<double> offset,
+                const std::string& where) {
   constexpr double kRateWithin = 0.1;  // beyond this share, samples were lost between two blocks
   if (blocks.size() < 2) {
     throw StartupError(ExitCode::kData,
@@ -162,9 +183,7 @@ Stream streamOf(const std::vector<Block>& blocks, const std::string& where) {
                        "are needed: record for at least 3 s",
                        where, blocks.size());
   }
-  const bool stamped =
-      std::ranges::all_of(blocks, [](const Block& b) { return b.stamp_s.has_value(); });
-  const auto times = stamped ? timesByStamps(blocks) : timesByPackets(blocks);
+  const auto times = offset ? timesByStamps(blocks, *offset) : timesByPackets(blocks);
   const double usual_s = usualStep(blocks, times, where);
   Stream stream;
   for (std::size_t i = 0; i < blocks.size(); ++i) {
@@ -221,13 +240,19 @@ Parts readGoPro(const fs::path& path, Recording& recording) {
   parts.where = camera.film.string();
   const Telemetry telemetry = readTelemetry(camera.film, recording);
   refuseStabilised(telemetry, parts.where);
-  parts.gyro = streamOf(telemetry.gyro, parts.where);
-  parts.accel = streamOf(telemetry.accel, parts.where);
+  const auto offset = clockOffset(telemetry);
+  parts.gyro = streamOf(telemetry.gyro, offset, parts.where);
+  parts.accel = streamOf(telemetry.accel, offset, parts.where);
   orderByTime(parts.gyro, "imu", parts.where, recording);
   orderByTime(parts.accel, "accel", parts.where, recording);
   recording.notes.push_back(parts.where +
                             ": its telemetry has no common clock with the frames, to some 10 ms; "
                             "`perdure calibrate from-motion` finds the rest as time_offset_s");
+  if (telemetry.image_turns.empty()) {
+    recording.notes.push_back(parts.where +
+                              ": this camera does not say whether the film is stabilised; record "
+                              "with stabilisation off, or images contradict the inertial unit");
+  }
   parts.cameras.push_back(std::move(camera));
   return parts;
 }

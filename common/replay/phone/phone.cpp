@@ -41,10 +41,15 @@ namespace {
 /// In this order, because a MARS folder also has the files of kFilmWithTables.
 const Format* formatOf(const std::filesystem::path& folder) {
   for (const Format* format : {&kMarsLogger, &kSpectacularAi, &kSensorLogger, &kIosLogger,
-                               &kFilmWithTables, &kJsonRecords, &kGoPro}) {
+                               &kFilmWithTables, &kJsonRecords}) {
     if (format->looks(folder)) return format;
   }
   return nullptr;
+}
+
+Parts readParts(const std::filesystem::path& path, Recording& recording) {
+  const Format* format = formatOf(path);
+  return (format == nullptr ? kGoPro : *format).read(path, recording);
 }
 
 void requireReadings(const Parts& parts) {
@@ -129,10 +134,12 @@ bool looksLikePhone(const std::filesystem::path& folder) {
   return phone::formatOf(folder) != nullptr;
 }
 
+bool looksLikeGoPro(const std::filesystem::path& path) { return phone::kGoPro.looks(path); }
+
 Recording readPhone(const DatasetOptions& options) {
   Recording recording;
   recording.kind = DatasetKind::kPhone;
-  const phone::Parts parts = phone::formatOf(options.path)->read(options.path, recording);
+  const phone::Parts parts = phone::readParts(options.path, recording);
   phone::dropPausesOfAccel(recording);
   phone::joinImu(parts, recording);
   recording.calibration.imu = phone::usualNoise(recording.imu);

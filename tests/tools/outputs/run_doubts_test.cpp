@@ -69,10 +69,9 @@ TEST(Doubts, TheLastLineNamesWhatWouldElseBeSilent) {
   RunFacts facts{.vio = vio, .frames = 240, .boxes = 70};
   facts.findings.push_back({Grade::kCause, "clock_set", "set back by 2 s"});
   facts.findings.push_back({Grade::kNote, "camera_unknown", "has no effect"});
-  EXPECT_EQ(
-      endOfLine(doubtsOfRun(facts)),
-      " | WARNING: clock_set; no image point could be used at 90 of 240 frames; the "
-      "map is empty although there are 70 boxes");
+  EXPECT_EQ(endOfLine(doubtsOfRun(facts)),
+            " | WARNING: clock_set; no image point could be used at 90 of 240 frames; the "
+            "map is empty although there are 70 boxes");
   EXPECT_THAT(sentences(facts), Contains(HasSubstr("set back by 2 s")));
 }
 
@@ -88,7 +87,7 @@ TEST(RunDoubts, ACauseInTheDataComesBeforeItsConsequences) {
   RunFacts facts{.frames = 100};
   facts.vio.add("images_contradict_imu", 60);
   EXPECT_THAT(doubtsOfRun(facts)[0].fix, testing::StartsWith("T_BS"));
-  facts.findings = {{Grade::kWarning, "clock_step", "stamps jump"}};
+  facts.findings = {{Grade::kCause, "clock_step", "stamps jump"}};
   const auto doubts = doubtsOfRun(facts);
   ASSERT_EQ(doubts.size(), 2U);
   EXPECT_EQ(doubts[0].fix, "stamps jump");

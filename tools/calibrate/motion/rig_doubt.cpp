@@ -62,11 +62,16 @@ replay::DataFindings judge(const CameraCalibration& given, const JointEstimate& 
   return findings;
 }
 
+bool fits(const JointEstimate& joint) {
+  constexpr double kResidual_px = 2.0, kInliers = 0.6;
+  return joint.residual_px < kResidual_px && joint.inliers >= kInliers;
+}
+
 /// Whether the standard deviations are at most `share` of the largest that permit a judgement.
 bool isSure(const JointEstimate& joint, double share) {
-  constexpr double kSureShare = 0.01, kSure_s = 0.004, kResidual_px = 2.0, kInliers = 0.6;
+  constexpr double kSureShare = 0.01, kSure_s = 0.004;
   return joint.sigma[kFocal] < share * kSureShare && joint.sigma[kLater] < share * kSure_s &&
-         joint.residual_px < kResidual_px && joint.inliers >= kInliers;
+         fits(joint);
 }
 
 /// Least changes that are reported: rotation in rad, bias in rad/s, relative focal length.
@@ -106,8 +111,9 @@ replay::DataFindings judgeChange(const JointEstimate& a, const JointEstimate& b,
   }
   if (what.empty()) return {};
   return {{Grade::kCause, "rig_changes",
-           fmt::format("{}: from about {} ns on, {}; cut the drive there", a.state.camera.name,
-                       toNanoseconds(middle), what)}};
+           fmt::format("{}: between the parts of the drive before and after {} ns, {}; find when, "
+                       "and cut the drive there",
+                       a.state.camera.name, toNanoseconds(middle), what)}};
 }
 
 /// Whether both halves of the windows ask for the same values.
@@ -126,8 +132,9 @@ replay::DataFindings checkHalves(const std::vector<TrackWindow>& windows,
     halves[window.times.front() < middle ? 0 : 1].push_back(window);
   }
   if (std::min(halves[0].size(), halves[1].size()) < kFewest) return {};
-  return judgeChange(estimateJointly(halves[0], recording.imu, options),
-                     estimateJointly(halves[1], recording.imu, options), middle);
+  const JointEstimate a = estimateJointly(halves[0], recording.imu, options),
+                      b = estimateJointly(halves[1], recording.imu, options);
+  return fits(a) && fits(b) ? judgeChange(a, b, middle) : replay::DataFindings();
 }
 
 }  // namespace
@@ -165,7 +172,7 @@ MotionCheck checkMotion(const replay::Recording& recording) {
       "ms, readout {:.1f} ± {:.1f} ms",
       tracks.images, joint.windows, found.fx, 100.0 * s[kFocal], 1e3 * found.time_offset_s,
       1e3 * s[kLater], 1e3 * found.readout_s, 1e3 * s[kReadout]);
-  if (!even) {
+  if (!isEven(joint)) {
     if (auto changes = checkHalves(tracks.windows, recording, options); !changes.empty())
       return {changes, "the motion judges the halves of the drive; together they show " + shown};
   }

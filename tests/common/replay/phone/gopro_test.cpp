@@ -59,11 +59,20 @@ TEST(GoPro, SamplesHaveTheStampsOfTheCamerasClock) {
   }
 }
 
+TEST(GoPro, BothSensorsShareTheCamerasClock) {
+  const auto same = openGoPro(goPro("gopro_same"));
+  const auto late = openGoPro(goPro("gopro_late", {.accel_late_us = 20'000}));
+  const ImuSample& before = same->recording().imu[200];
+  for (const ImuSample& sample : late->recording().imu) {
+    if (std::abs(sample.gyro.x() - before.gyro.x()) > 1e-9) continue;
+    EXPECT_NEAR(sample.accel.x(), before.accel.x() - 2e-3, 1e-6);  // 2 samples of 1 mm/s² less
+  }
+}
+
 TEST(GoPro, WithoutStampsThePacketsLieOnALine) {
   const auto dataset =
       openGoPro(goPro("gopro_line", {.stamps = false, .jitter_ms = {0, 5, -5, 0}}));
   expectSamples(*dataset, 6e-3);
-  std::vector<double> steps;
   const auto& imu = dataset->recording().imu;
   for (std::size_t i = 1; i < imu.size(); ++i) {
     EXPECT_NEAR(toSeconds(imu[i].time - imu[i - 1].time), 5e-3, 1e-4);
@@ -87,6 +96,9 @@ TEST(GoPro, AStabilisedFilmIsRefused) {
 TEST(GoPro, AFilmWithoutTelemetryAndSeveralFilmsAreNamed) {
   const fs::path folder = freshFolder("gopro_none");
   writeFilm(folder / "holiday.mp4");
+  writeText(folder / "cut.mp4", "no film");
+  EXPECT_THAT(errorOfGoPro(folder / "cut.mp4"), HasSubstr("was not finished"));
+  fs::remove(folder / "cut.mp4");
   EXPECT_THAT(errorOfGoPro(folder / "holiday.mp4"),
               AllOf(HasSubstr("holiday.mp4 has no track"), HasSubstr("as the camera")));
   EXPECT_THAT(errorOfGoPro(folder), HasSubstr("no dataset folder"));

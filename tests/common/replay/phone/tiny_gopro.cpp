@@ -22,7 +22,7 @@ std::string bytesOf(std::int64_t number, std::size_t size) {
 
 /// One sensor's samples of a packet.
 std::string stream(const std::string& key, std::size_t packet, std::int64_t per_packet,
-                   const TinyGoPro& how, std::int64_t y, std::int64_t z) {
+                   const TinyGoPro& how, std::int64_t y, std::int64_t z, std::int64_t late_us = 0) {
   const auto first = static_cast<std::int64_t>(packet) * per_packet;
   std::vector<std::int64_t> numbers;
   for (std::int64_t i = first; i < first + per_packet; ++i) {
@@ -31,7 +31,8 @@ std::string stream(const std::string& key, std::size_t packet, std::int64_t per_
   std::string items;
   constexpr std::int64_t kClock_us = 7'000'000;  // of the camera at the start of the film
   if (how.stamps) {
-    items += gpmfNumbers("STMP", 'J', {kClock_us + 500'000 * static_cast<std::int64_t>(packet)});
+    items += gpmfNumbers("STMP", 'J',
+                         {kClock_us + late_us + 500'000 * static_cast<std::int64_t>(packet)});
   }
   items += gpmfNumbers("TSMP", 'L', {first + per_packet});
   items += gpmfItem("STNM", 'c', 5, 1, "a name");
@@ -41,10 +42,10 @@ std::string stream(const std::string& key, std::size_t packet, std::int64_t per_
 
 std::string packetOf(std::size_t packet, const TinyGoPro& how) {
   const std::int64_t z = packet + 1 == kPackets ? how.image_turn : 0;
-  std::string turns =
+  const std::string turns =
       gpmfNumbers("SCAL", 's', {32767}) + gpmfNumbers("IORI", 's', {32767, 0, 0, z}, 4);
   const std::string items = stream("GYRO", packet, 100, how, 200, -300) +
-                            stream("ACCL", packet, 50, how, 9807, 0) +
+                            stream("ACCL", packet, 50, how, 9807, 0, how.accel_late_us) +
                             gpmfItem("STRM", '\0', 1, turns.size(), turns);
   std::string whole = gpmfItem("DEVC", '\0', 1, items.size(), items);
   if (packet == how.damaged) whole.resize(whole.size() / 2);

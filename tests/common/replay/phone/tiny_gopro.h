@@ -18,6 +18,7 @@ std::string gpmfNumbers(const std::string& key, char type, const std::vector<std
 
 struct TinyGoPro {
   bool stamps = true;               ///< with STMP
+  std::int64_t accel_late_us = 0;   ///< of the accelerometer's STMP
   std::vector<int> jitter_ms = {};  ///< of the times of the packets in the film
   std::size_t lost = 99;            ///< number of a packet that is missing
   std::size_t damaged = 99;         ///< number of a packet that is cut off
