@@ -9,6 +9,11 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+bool isGiven(const Json& request, const char* name) {
+  const auto found = request.find(name);
+  return found != request.end() && !found->is_null();
+}
+
 std::uint64_t idIn(const Json& request, const char* name) {
   const auto found = request.find(name);
   return found != request.end() && found->is_number_unsigned() ? found->get<std::uint64_t>() : 0;
@@ -34,8 +39,9 @@ std::optional<Correction> correctionOf(const Json& request) {
   if (!request.is_object()) return std::nullopt;
   Correction correction;
   correction.author = textIn(request, "author");
-  correction.withdrawn = request.contains("withdraw");
+  correction.withdrawn = isGiven(request, "withdraw");
   if (correction.withdrawn) {
+    if (isGiven(request, "object") || isGiven(request, "kind")) return std::nullopt;
     correction.id = idIn(request, "withdraw");
     return isWhole(correction) ? std::optional(correction) : std::nullopt;
   }
@@ -48,8 +54,9 @@ std::optional<Correction> correctionOf(const Json& request) {
   correction.object = idIn(request, "object");
   correction.other = idIn(request, "other");
   correction.class_name = textIn(request, "class");
-  if (const auto nats = request.find("nats"); nats != request.end()) {
-    correction.nats = nats->is_number() ? nats->get<double>() : -1.0;
+  if (isGiven(request, "nats")) {
+    const Json& nats = request.at("nats");
+    correction.nats = nats.is_number() ? nats.get<double>() : -1.0;
     if (!(correction.nats > 0.0 && correction.nats <= kMostCorrectionNats)) return std::nullopt;
   }
   return isWhole(correction) ? std::optional(correction) : std::nullopt;

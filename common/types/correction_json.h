@@ -13,8 +13,8 @@ inline constexpr char kCorrectionForms[] =
     "\"car\"}, {\"object\": 12, \"kind\": \"same\" or \"different\", \"other\": 15}, or "
     "{\"withdraw\": 3}";
 
-/// Returns the correction of a request in one of the forms, with "nats" and "author" if given.
-/// Returns nothing if the request has another form.
+/// Returns the correction of a request in one of the forms, with "nats" and "author" if given. A
+/// field that is null counts as absent. Returns nothing if the request has another form.
 std::optional<Correction> correctionOf(const nlohmann::ordered_json& request);
 
 nlohmann::ordered_json toJson(const Correction& correction);

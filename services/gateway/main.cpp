@@ -5,6 +5,7 @@
 #include <list>
 #include <memory>
 #include <mutex>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <vector>
 
@@ -234,6 +235,24 @@ std::map<std::string, std::string> standIns(const bus::Participant& participant,
   return sentences;
 }
 
+/// Puts the truth of a simulated drive into the page.
+void addTruth(const std::string& truth, const std::filesystem::path& folder, web::Files& files) {
+  const std::string text = textOf(truth);
+  if (text.empty()) {
+    throw StartupError(ExitCode::kUnavailable, "page.truth: {} is empty or cannot be read", truth);
+  }
+  if (!nlohmann::json::accept(text)) {
+    throw StartupError(ExitCode::kData, "page.truth: {} is not JSON; run the demo again", truth);
+  }
+  if (!files.empty() && !files.find("/truth.json")) {
+    throw StartupError(ExitCode::kUnavailable,
+                       "page.truth: the page in {} has no truth.json; build it again, or leave out "
+                       "page.truth",
+                       folder.string());
+  }
+  files.replaceIn("/truth.json", "null", text);
+}
+
 web::Content contentFor(const service::Context& context, const gateway::Config& config) {
   const auto folder = config.page_folder.empty() ? web::usualPageFolder()
                                                  : std::filesystem::path(config.page_folder);
@@ -248,12 +267,7 @@ web::Content contentFor(const service::Context& context, const gateway::Config& 
     files.replaceIn("/foxglove_layout.json", "/camera/cam0/",
                     "/camera/" + config.cameras.front() + "/");
   }
-  if (const auto& truth = config.page_truth; !truth.empty()) {
-    if (textOf(truth).empty()) {
-      throw StartupError(ExitCode::kUnavailable, "page.truth: {} cannot be read", truth);
-    }
-    files.replaceIn("/truth.json", "null", textOf(truth));
-  }
+  if (!config.page_truth.empty()) addTruth(config.page_truth, folder, files);
   return {"perdure", toHex(context.instance()), std::move(channels), gateway::serviceTable(),
           std::move(files)};
 }

@@ -56,6 +56,9 @@ void Corrections::apply(std::vector<Event>& events, const Objects& objects) cons
     event.object_id = objectOf(event.object_id);
     event.other_id = objectOf(event.other_id);
   }
+  std::erase_if(events, [](const Event& event) {
+    return event.kind == EventKind::kMerged && event.object_id == event.other_id;
+  });
 }
 
 }  // namespace perdure::semantic_filter

@@ -17,7 +17,7 @@ class Corrections {
   /// Of several tracks that people joined, the one detected last remains.
   void apply(Objects& objects) const;
   /// Gives events the ids of the objects that apply() returned. Leaves out events about tracks that
-  /// it left out.
+  /// it left out, and merges of tracks that people joined before.
   void apply(std::vector<Event>& events, const Objects& objects) const;
 
  private:

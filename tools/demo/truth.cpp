@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
 #include <limits>
 #include <vector>
 
 #include "common/base/algorithms/median.h"
+#include "common/base/checked_file.h"
 #include "common/base/errors.h"
 #include "common/replay/dataset.h"
 #include "common/replay/files/kitti_calibration.h"
@@ -153,7 +153,7 @@ bool writeTruthForPage(const fs::path& drive, const fs::path& file) {
   for (const auto& object : sim::readTruth(drive).objects) {
     truth["objects"].push_back(toJson(object));
   }
-  std::ofstream(file) << truth;
+  writeChecked(file, truth.dump());
   return true;
 }
 

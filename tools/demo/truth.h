@@ -25,7 +25,7 @@ std::optional<TruthFiles> findTruth(const DemoOptions& options);
 nlohmann::ordered_json scoreAgainst(const TruthFiles& truth, const std::filesystem::path& out);
 
 /// Writes the true path and the true objects of a simulated drive, in the world's frame. Returns
-/// false, without a file, if the drive lacks a part of the truth.
+/// false, without a file, if the drive lacks a part of the truth. Throws like writeChecked().
 bool writeTruthForPage(const std::filesystem::path& drive, const std::filesystem::path& file);
 
 }  // namespace perdure::tools

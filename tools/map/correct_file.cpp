@@ -18,7 +18,8 @@ double checkUsable(const std::string& path) {
   }
   if (connection->has("outbox").value_or(false)) {
     throw StartupError(ExitCode::kUsage,
-                       "{} is sent to a server: start its map_store, and leave out --db", path);
+                       "{} is sent to a server: start its map_store, and leave out --db or --map",
+                       path);
   }
   const auto size = connection->first("SELECT value FROM meta WHERE key = 'tile_size_m'",
                                       [](const map_store::Statement& row) { return row.real(0); });
@@ -27,8 +28,8 @@ double checkUsable(const std::string& path) {
     return size ? size->value_or(map_store::Config().tile_size_m) : map_store::Config().tile_size_m;
   if (alone.error().code != "busy") map_store::cannotReadMap(path, alone.error());
   throw StartupError(ExitCode::kUnavailable,
-                     "{} is in use by another program; leave out --db to send the correction to "
-                     "the running map_store, or stop it",
+                     "{} is in use by another program; leave out --db or --map to send the "
+                     "correction to the running map_store, or stop it",
                      path);
 }
 

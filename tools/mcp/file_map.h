@@ -38,7 +38,8 @@ class FileMap : public gateway::mcp::Map {
     const MapReply reply = correctFile(path_, correction);
     file_.emplace(path_);
     if (!reply.ok) throw gateway::mcp::NoAnswer(reply.error);
-    return reply.corrections.at(0);
+    if (reply.corrections.empty()) throw gateway::mcp::NoAnswer("the reply lacks the correction");
+    return reply.corrections.front();
   }
 
  private:

@@ -28,7 +28,8 @@ struct FusionReport {
 };
 
 /// Adds `other` to `map`; both must have at least one session. The order in which the others are
-/// added does not matter if the first of all is the one that comesFirst() selects.
+/// added does not matter if the first of all is the one that comesFirst() selects. Exception: it
+/// decides which corrections beyond kMostCorrections are left out.
 FusionReport fuseInto(MapContents& map, const MapContents& other, const Parameters& parameters);
 
 /// Returns sessions grouped by component, in descending order of the component's number of anchors.

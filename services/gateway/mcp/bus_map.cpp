@@ -74,7 +74,9 @@ State BusMap::begin() {
 MapReply BusMap::ask(const MapQuery& query) { return answered(client_.ask(query, kPatience_s)); }
 
 Correction BusMap::correct(const Correction& correction) {
-  return answered(client_.correct(correction, kPatience_s)).corrections.at(0);
+  const MapReply reply = answered(client_.correct(correction, kPatience_s));
+  if (reply.corrections.empty()) throw NoAnswer("map_store's reply lacks the correction");
+  return reply.corrections.front();
 }
 
 }  // namespace perdure::gateway::mcp

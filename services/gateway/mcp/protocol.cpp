@@ -30,7 +30,8 @@ constexpr char kInstructions[] =
     "p)): "
     "prior (before the first box), hit, repeated (hits from the same place), miss (not detected "
     "although in view), screened (misses excused: something unmapped may hide it), hidden and away "
-    "(not looked at; 0), time, misshapen, lost, shared, merge, restore, recall, and unexplained.";
+    "(not looked at; 0), time, misshapen, lost, shared, merge, restore, recall, person "
+    "(corrections by people), and unexplained.";
 
 Json errorOf(const Json& id, const RpcError& error) {
   return {{"jsonrpc", "2.0"},

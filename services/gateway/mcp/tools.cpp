@@ -173,6 +173,15 @@ Json neverSeen(const Json& arguments, Map& map) {
   return answer;
 }
 
+/// Returns the present state of an object; null if the map does not have it, or gives no answer.
+Json presentOrNull(Map& map, const State& state, ObjectId id) {
+  try {
+    return presentOf(map, state, id).json;
+  } catch (const std::runtime_error&) {  // NoAnswer, or StartupError of a file
+    return nullptr;
+  }
+}
+
 Json correctMap(const Json& arguments, Map& map) {
   auto correction = correctionOf(arguments);
   if (!correction) throw NoAnswer(std::string("correct as ") + kCorrectionForms);
@@ -181,7 +190,7 @@ Json correctMap(const Json& arguments, Map& map) {
   const State state = map.begin();
   Json answer = answerOf(state);
   answer["correction"] = perdure::toJson(made);
-  answer["object"] = presentOf(map, state, made.object).json;
+  answer["object"] = presentOrNull(map, state, made.object);
   return answer;
 }
 
@@ -198,10 +207,11 @@ Json itemSchema() {
     "required": ["probability", "log_odds", "evidence", "age_s"]})");
 }
 
-Json resultSchema(const char* list) {
+Json resultSchema(const char* list, bool or_null) {
   Json properties{{"frame", {{"type", "string"}}}, {"now_s", {{"type", "number"}}}};
   const bool single = std::string(list) == "object";
   properties[list] = single ? itemSchema() : Json{{"type", "array"}, {"items", itemSchema()}};
+  if (or_null) properties[list]["type"] = Json::array({"object", "null"});
   return {{"type", "object"}, {"properties", properties}, {"required", {"frame", "now_s", list}}};
 }
 
@@ -247,7 +257,7 @@ const std::vector<Tool>& tools() {
       {"correct",
        "Corrects the map, if a person asks for it: an object is not there, has another class, or "
        "two objects are the same or different. Or withdraws the correction with a number. `object` "
-       "has the evidence afterwards, with the entry `person`.",
+       "has the evidence afterwards, with the entry `person`; null: it is not on the map.",
        schemaOfArguments({"object", "kind", "class", "other", "nats", "author", "withdraw"}, {}),
        "object", correctMap, true}};
   return all;
@@ -276,7 +286,7 @@ Json listTools(const Map& map) {
     list.push_back({{"name", tool.name},
                     {"description", tool.description},
                     {"inputSchema", tool.input},
-                    {"outputSchema", resultSchema(tool.list)},
+                    {"outputSchema", resultSchema(tool.list, tool.writes)},
                     {"annotations", {{"readOnlyHint", !tool.writes}, {"openWorldHint", false}}}});
   }
   return list;

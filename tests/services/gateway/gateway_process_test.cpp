@@ -153,6 +153,23 @@ TEST_F(Gateway, ServesTheLayoutForItsOwnCamera) {
   EXPECT_THAT(layout, Not(HasSubstr("cam0")));
 }
 
+TEST_F(Gateway, RefusesATruthThatThePageCannotShow) {
+  std::filesystem::create_directories(folder_.file("page"));
+  std::ofstream(folder_.file("page/index.html")) << "<title>the page</title>";
+  const std::string truth = folder_.file("true.json");
+  const auto refusalOf = [&](const std::string& text, int status) {
+    std::ofstream(truth) << text;
+    Child gateway({(programs() / "perdure-gateway").string(), "--port", "0", "--set",
+                   "page.folder=" + folder_.file("page"), "--set", "page.truth=" + truth},
+                  folder_.file("refused"));
+    EXPECT_EQ(gateway.wait(20s), status) << gateway.log();
+    return gateway.log();
+  };
+  EXPECT_THAT(refusalOf("", 69), HasSubstr("cannot be read"));
+  EXPECT_THAT(refusalOf("{\"path\": [", 65), HasSubstr("is not JSON"));
+  EXPECT_THAT(refusalOf(R"({"path": [], "objects": []})", 69), HasSubstr("has no truth.json"));
+}
+
 TEST_F(Gateway, SaysInOneSentenceWhereThereIsNoPage) {
   start({"page.folder=" + folder_.file("absent")});
   EXPECT_THAT(get(port_, "/").text, HasSubstr("The page was not built"));

@@ -261,10 +261,23 @@ TEST_F(GatewayNodeWithToken, SendsCorrectionsToTheMapAndPassesItsAnswer) {
   EXPECT_EQ(answers_[1].payload, "no correction 4 stands");
 }
 
+TEST_F(GatewayNodeWithToken, NullInACorrectionIsAnAbsentField) {
+  for (const char* text :
+       {R"({"object":12,"kind":"not_there","nats":null,"author":null,"withdraw":null})",
+        R"({"withdraw":4,"object":null,"kind":null})"}) {
+    node_.onCall({7, kCorrectService, 1, text}, kSecond);
+  }
+  ASSERT_EQ(corrections_.size(), 2u);
+  EXPECT_EQ(corrections_[0].correction, perdure::test::notThere(12));
+  EXPECT_EQ(corrections_[1].correction, perdure::test::withdrawal(4));
+}
+
 TEST_F(GatewayNodeWithToken, RefusesCorrectionsThatSayNothing) {
   for (const char* text : {"", "[]", "{}", R"({"object":12})", R"({"object":12,"kind":"gone"})",
                            R"({"object":-1,"kind":"not_there"})", R"({"object":12,"kind":"class"})",
-                           R"({"object":12,"kind":"same"})", R"({"withdraw":"4"})"}) {
+                           R"({"object":12,"kind":"same"})", R"({"withdraw":"4"})",
+                           R"({"withdraw":4,"object":12})", R"({"withdraw":4,"kind":"not_there"})",
+                           R"({"withdraw":null})", R"({"object":12,"kind":"same","other":null})"}) {
     node_.onCall({7, kCorrectService, 1, text}, kSecond);
     ASSERT_FALSE(answers_.empty()) << text;
     EXPECT_THAT(answers_.back().payload, HasSubstr("correct as {\"object\": 12")) << text;

@@ -63,11 +63,13 @@ TEST(Corrections, EventsAndOccludersHaveTheIdsOfJoinedObjects) {
   corrections.apply(objects);
   EXPECT_EQ(objects.objects.at(1).blocked_by, 1u);
   EXPECT_EQ(objects.as_estimated.at(2).blocked_by, 2u);
-  std::vector<Event> events(4);
+  std::vector<Event> events(5);
   events[0].object_id = 1;  // its track is not shown
   events[1].object_id = 2;
   events[2].object_id = 4, events[2].other_id = 2;
   events[3].object_id = 5;
+  events[4].kind = EventKind::kMerged;  // of tracks that a person joined before
+  events[4].object_id = 2, events[4].other_id = 1;
   corrections.apply(events, objects);
   ASSERT_THAT(events, SizeIs(3));
   EXPECT_EQ(events[0].object_id, 1u);

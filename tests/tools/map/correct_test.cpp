@@ -116,7 +116,7 @@ TEST_F(CorrectCommand, RefusalsNameCauseAndFix) {
   EXPECT_THROW((void)run({"1", "--not-there", "--class", "car"}), CLI::ParseError);
   const map_store::MapDatabase running({path_});
   EXPECT_THAT(refusal({"1", "--not-there"}, ExitCode::kUnavailable),
-              HasSubstr("is in use by another program; leave out --db"));
+              HasSubstr("is in use by another program; leave out --db or --map"));
 }
 
 }  // namespace

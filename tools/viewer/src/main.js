@@ -62,7 +62,9 @@ function lookBack(time) {
   showState();
 }
 
+let linked = 0; // the id of the last link, until an object is selected
 function choose(id, { reveal = true, open = true } = {}) {
+  linked = 0;
   world?.choosePart(undefined);
   wished.object = undefined;
   model.chosen = id;
@@ -84,7 +86,11 @@ async function presentId(id) {
   const { objects } = await connection.call('/map/query', { id }).catch(() => ({}));
   return objects?.[0]?.id ?? id;
 }
-async function chooseLinked(id) { choose(await presentId(id)); }
+async function chooseLinked(id) {
+  linked = id;
+  const present = await presentId(id);
+  if (linked === id) choose(present); // otherwise there is a newer selection
+}
 
 /** Selects an anchor or a loop of the map's graph: {kind, id}. */
 function choosePart(part) {

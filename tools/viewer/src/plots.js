@@ -38,11 +38,11 @@ export function chart(title, series, { high, least = 0.1, say, shaded = [], curs
 
 /** Returns charts of error and 2 σ, of the vehicle and of the selected object. */
 function errorCharts(model, o) {
-  const { truth, past } = model;
-  if (!truth) return '';
+  const { truth, past, start } = model;
+  if (!truth || !start) return '';
   const one = (title, errors, none) => chart(`Error of ${title}`, [{ name: 'error', colour: TRUE_COLOUR, samples: (errors ?? []).map((s) => [s[0], s[1]]) }, { name: '2 σ', colour: COLOURS[0], samples: (errors ?? []).map((s) => [s[0], 2 * s[2]]) }], { say: (v) => `${v.toFixed(2)} m`, cursor: past, none });
   return one('the vehicle', truth.errorsOfBody(model.drive), 'no data yet') + (o ? one(escaped(wordsOf(o)), truth.errorsOf(o, model), `No true ${escaped(o.class)} is within 3 m.`) : '')
-    + `<p class="dim">Truth is aligned in position and yaw at ${wordsOfTime(model.start.time, model.origin)}, the first pose that this page received. σ is the root of the covariance's trace.</p>`;
+    + `<p class="dim">Truth is aligned in position and yaw at ${wordsOfTime(start.time, model.origin)}, the first pose that this page received. σ is the root of the covariance's trace.</p>`;
 }
 
 /** Shows errors if the truth is shown, σ of the selected object, speed, latency and CPU. */

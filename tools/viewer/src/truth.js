@@ -15,7 +15,7 @@ function yawBetween(from, to) {
 
 /** Returns the value [x, y, z, …] of rows [time, …] at a time, between its neighbours. */
 function between(rows, time) {
-  const i = Math.min(rows.length - 1, Math.max(1, rows.findIndex((row) => row[0] >= time))), [a, b] = [rows[i - 1], rows[i]];
+  const next = rows.findIndex((row) => row[0] >= time), i = next < 0 ? rows.length - 1 : Math.max(1, next), [a, b] = [rows[i - 1], rows[i]];
   if (!a || !b) return rows[0].slice(1);
   const share = Math.min(1, Math.max(0, (time - a[0]) / (b[0] - a[0])));
   return a.slice(1).map((v, k) => v + share * (b[k + 1] - v));

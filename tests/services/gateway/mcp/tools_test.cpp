@@ -90,6 +90,11 @@ TEST_F(McpTools, CorrectsTheMapOnlyWhereThatIsAllowed) {
   EXPECT_EQ(answer["object"]["evidence"]["person"]["log_odds"], -2.5);
   EXPECT_EQ(answer["correction"]["author"], "assistant");
   EXPECT_EQ(answerTo("correct", R"({"withdraw":3})")["correction"]["withdrawn"], true);
+  const Json left = answerTo("correct", R"({"object":77,"kind":"not_there"})");
+  EXPECT_TRUE(left["object"].is_null()) << "it is not on the map any more";
+  EXPECT_EQ(left["correction"]["object"], 77);
+  EXPECT_EQ(tools[5]["outputSchema"]["properties"]["object"]["type"],
+            Json::array({"object", "null"}));
   for (const char* unfit : {"{}", R"({"object":1})", R"({"object":1,"kind":"same"})",
                             R"({"object":1,"kind":"class"})", R"({"kind":"not_there"})"}) {
     EXPECT_THAT(refusalOf("correct", unfit), HasSubstr("correct as {\"object\": 12")) << unfit;

@@ -380,6 +380,8 @@ figures.truth = await page.evaluate(async () => {
   const off = model.truth, button = document.querySelector('[data-key=u]');
   choose(1);
   button.click();
+  const { Model } = await import('./model.js'), { renderPlots } = await import('./plots.js'), early = document.createElement('div');
+  renderPlots(early, Object.assign(new Model(), { truth: model.truth })); // a page that has no objects yet
   await new Promise((r) => setTimeout(r, 600));
   const { truth } = model, [time, body] = truth.errorsOfBody(model.drive).at(-1);
   const words = { panel: document.getElementById('object').innerText.match(/error\s+(.*)/)?.[1], bar: document.getElementById('figures').innerText.match(/error\s+(.*)/i)?.[1] };
@@ -388,10 +390,10 @@ figures.truth = await page.evaluate(async () => {
   const drawn = { boxes: truth.boxes.geometry.attributes.position.count, way: [0, 1].map((i) => [path.getX(i), path.getY(i)].map((v) => v.toFixed(1))), yaw: truth.yaw };
   // At the first pose, the body was 1 cm/s times its time ahead of the origin of the truth.
   const error = Math.hypot(0.3 - 0.01 * model.start.time, 0.4).toFixed(2);
-  return { off, error, hidden: button.hidden, drawn, words, partners, grown: body - 0.01 * (time - model.start.time), shown: truth.group.visible && world.scene.children.includes(truth.group) };
+  return { off, error, hidden: button.hidden, drawn, words, partners, grown: body - 0.01 * (time - model.start.time), shown: truth.group.visible && world.scene.children.includes(truth.group), early: early.innerText };
 });
 const { truth } = figures;
-check(truth.off === undefined && !truth.hidden && truth.shown, `U: the truth is shown (${JSON.stringify(truth)})`);
+check(truth.off === undefined && !truth.hidden && truth.shown && !truth.early.includes('Error'), `U: the truth is shown (${JSON.stringify(truth)})`);
 check(truth.drawn.boxes === 26 && Math.abs(truth.drawn.yaw + Math.PI / 2) < 1e-3 && String(truth.partners) === '4,', `true objects that are present, aligned by the first pose (${JSON.stringify(truth)})`);
 check(truth.words.panel === `${truth.error} m, σ 0.35 m` && truth.words.bar?.endsWith('σ 1.73 m') && Math.abs(truth.grown) < 0.005, `errors against σ (${JSON.stringify(truth)})`);
 await page.keyboard.press('5');
@@ -409,14 +411,18 @@ check(await page.evaluate(async () => {
   button.hidden = false;
   return hides && none === null && hidden;
 }), 'without truth there is no switch');
+check(await page.evaluate(async () => {
+  const { Truth } = await import('./truth.js'), truth = new Truth({ path: [[0, 0, 0, 0], [1, 1, 0, 0], [2, 5, 0, 0]], objects: [] });
+  return [-1, 0.5, 1.5, 9].map((time) => truth.body(time)[0]).join() === '0,0.5,3,5';
+}), 'true places before, between and after the rows');
 
 // An id that was joined to another object selects that object: by a link, the address, and when it is joined.
 const joined = await page.evaluate(async () => {
   const { connection, model, choose } = window.perdure, call = connection.call.bind(connection), wait = (ms) => new Promise((r) => setTimeout(r, ms));
   connection.call = (name, request) => (request.id !== 99 ? call(name, request) : Promise.resolve(name === '/object' ? { object: model.objects.get(2) } : { objects: [{ id: 2 }] }));
-  const chosen = [];
+  const chosen = [], follow = () => { document.getElementById('events').insertAdjacentHTML('beforeend', '<li data-object="99">car 99</li>'); document.querySelector('[data-object="99"]').click(); };
   for (const way of [
-    () => { document.getElementById('events').insertAdjacentHTML('beforeend', '<li data-object="99">car 99</li>'); document.querySelector('[data-object="99"]').click(); },
+    follow,
     () => { history.replaceState(null, '', '#object=99'); dispatchEvent(new HashChangeEvent('hashchange')); },
     () => { document.querySelector('[data-tab=object]').click(); choose(99); }]) {
     choose(0);
@@ -424,10 +430,18 @@ const joined = await page.evaluate(async () => {
     for (let i = 0; i < 100 && model.chosen !== 2; ++i) await wait(100);
     chosen.push(model.chosen);
   }
+  let answer;
+  connection.call = (name, request) => (request.id !== 99 ? call(name, request) : new Promise((r) => { answer = r; }));
+  follow();
+  choose(1);
+  answer({ objects: [{ id: 2 }] });
+  await wait(50);
+  chosen.push(model.chosen);
+  choose(2);
   connection.call = call;
   return chosen;
 });
-check(String(joined) === '2,2,2', `ids that were joined to another object (${joined})`);
+check(String(joined) === '2,2,2,1', `ids that were joined to another object, and a late answer (${joined})`);
 
 // The time line: a row for each object, marks of events by the filter, and earlier times of live data.
 await page.keyboard.press('1');
