@@ -235,7 +235,8 @@ TrackedFrame Node::trackImages(const cv::Mat& first, const cv::Mat& second, Time
   if (cameras_->estimator.options().calibration.estimated().lens) {
     cameras_->tracker.setCameras(cameras_->estimator.cameras(cameras_->models));
   }
-  // With the rotation, the tracker can follow a minority of points at rest behind traffic.
+  // With the rotation, the tracker follows points through fast turns, and a minority of points at
+  // rest behind traffic.
   std::optional<Eigen::Matrix3d> R;
   const TimePoint from = timeBefore(now);
   if (from < now && !imu_.empty() && imu_.last() > from &&

@@ -142,8 +142,8 @@ std::vector<double> timesByPackets(const std::vector<Block>& blocks) {
   return {fitted.begin(), fitted.end()};
 }
 
-/// What is added to the stamps of the camera's clock, which both sensors share, for the time in the
-/// film; nothing if a block has no stamp.
+/// Offset from the camera's clock, which both sensors share, to the time in the film; nothing if a
+/// block has no stamp.
 std::optional<double> clockOffset(const Telemetry& telemetry) {
   std::vector<double> offsets;
   for (const auto* blocks : {&telemetry.gyro, &telemetry.accel}) {
@@ -246,8 +246,8 @@ Parts readGoPro(const fs::path& path, Recording& recording) {
   orderByTime(parts.gyro, "imu", parts.where, recording);
   orderByTime(parts.accel, "accel", parts.where, recording);
   recording.notes.push_back(parts.where +
-                            ": its telemetry has no common clock with the frames, to some 10 ms; "
-                            "`perdure calibrate from-motion` finds the rest as time_offset_s");
+                            ": the stamps of telemetry and frames may differ by some 10 ms; "
+                            "`perdure calibrate from-motion` finds this time_offset_s");
   if (telemetry.image_turns.empty()) {
     recording.notes.push_back(parts.where +
                               ": this camera does not say whether the film is stabilised; record "
